@@ -17,7 +17,7 @@ WITH_A_VEHICLE = frozenset({StripState.OFFERED, StripState.ACCEPTED, StripState.
 TAKEN = frozenset(state for state in StripState if state.is_taken)
 """With a vehicle, or to be with it next."""
 ALLOWED: dict[StripState, frozenset[StripState]] = {
-    StripState.OPEN: frozenset({StripState.OFFERED, StripState.NEXT, StripState.WITHDRAWN}),
+    StripState.OPEN: frozenset({StripState.OFFERED, StripState.NEXT, StripState.DONE, StripState.WITHDRAWN}),
     StripState.NEXT: frozenset(
         {StripState.ACCEPTED, StripState.UNDER_WAY, StripState.OPEN, StripState.DONE, StripState.FAILED}
     ),

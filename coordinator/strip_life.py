@@ -141,6 +141,8 @@ class StripLife:
             return
         record, name = self.ledger.get(status.strip), vehicle.entry.vehicle
         if record is None or record.vehicle != name or record.state not in TAKEN:
+            if record is not None and status.state is TaskState.DONE and self._was_served(record, vehicle):
+                self._await_looks(record, now_ms, f"{name} had served it, its looks are to come", name)
             if status.state is TaskState.DONE:  # by one that counted as lost: the map tells what is left
                 self._sectors.cut_by(now_ms, None if record is None else [record.window])
             elif status.state is not TaskState.REFUSED and record is not None and record.vehicle == name:
@@ -344,9 +346,16 @@ class StripLife:
         is_under_way = record.state is StripState.UNDER_WAY and vehicle.asked_back != record.strip.number
         return self._looks_within_ms > 0 and is_under_way
 
-    def _await_looks(self, record: StripRecord, now_ms: int, reason: str) -> None:
+    def _was_served(self, record: StripRecord, vehicle: KnownVehicle) -> bool:
+        """Whether a strip that is open again is done by the late word of a vehicle that had it, as its looks may come
+        later still: it had said before that it was at another, or it counted as lost."""
+        offer = vehicle.offers.get(record.strip.number)
+        is_open = record.state is StripState.OPEN
+        return self._looks_within_ms > 0 and is_open and offer is not None and offer.strip == record.strip
+
+    def _await_looks(self, record: StripRecord, now_ms: int, reason: str, name: str = "") -> None:
         self._looks_due_ms[record.strip.number] = now_ms + self._looks_within_ms
-        self._move(record, StripState.DONE, now_ms, reason, record.vehicle)
+        self._move(record, StripState.DONE, now_ms, reason, name or record.vehicle)
 
     def _await_no_more(self, record: StripRecord, now_ms: int) -> None:
         """What a vehicle was taken to have seen of a strip it has not: that is cut anew."""

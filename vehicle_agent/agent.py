@@ -84,6 +84,7 @@ class Agent:
         """Takes in what the vehicle and the coordinator say."""
         message = received.message
         self._now_ms = now_ms
+        waited = self._waits
         if isinstance(message, Nav):
             self._hear_nav(message, received.header.sent_ms, now_ms)
         elif isinstance(message, RunInfo) and self.coverage is None:
@@ -111,7 +112,15 @@ class Agent:
             self._outbox.extend(self.coverage.all_again())
             self.tell_again()
             self.report_state(now_ms)
+        if self._waits and not waited and not self._over:  # it may have turned away by the next report
+            pose = self.pose
+            if pose is not None and self.endurance.is_low(pose, now_ms, circles=True):
+                self.turn_home(now_ms)
         return self._step()
+
+    @property
+    def _waits(self) -> bool:
+        return self.mode in (Mode.IDLE, Mode.FINISHED)
 
     def on_wake(self, now_ms: int) -> Step:
         """Reports, every 10 s; asks again of a manoeuvre of which too long nothing was heard."""
@@ -119,7 +128,7 @@ class Agent:
         self._wake_ms = now_ms + REPORT_EVERY_MS
         if self._word_due_ms is not None and now_ms >= self._word_due_ms:
             self._send_maneuver()
-        pose, circles = self.pose, self.mode in (Mode.IDLE, Mode.FINISHED)
+        pose, circles = self.pose, self._waits
         works, was_refused = not self.mode.is_out_of_work, self.mode is Mode.RETURNING and self.maneuver is None
         if was_refused or (pose is not None and works and self.endurance.is_low(pose, now_ms, circles=circles)):
             self.turn_home(now_ms)
@@ -276,7 +285,8 @@ class Agent:
     def _is_for_now(self, header: Header) -> bool:
         """Whether a task is for who is here now, and newer than all that were; takes note of it."""
         order = (header.incarnation, header.sequence)
-        if header.sent_ms < self._started_ms or order <= self._task_order:
+        # Of what has come by modem the second alone is known in which it was said.
+        if header.sent_ms < self._started_ms // 1000 * 1000 or order <= self._task_order:
             return False
         self._task_order = order
         return True

@@ -18,8 +18,10 @@ STYLES = {
     "priority": ("ff2b2016", 2.0),
     "track": ("ff2b2016", 2.5),
     "path": ("ff6f32a8", 1.5),
+    "keep_out": ("ff2020c0", 2.0),
     "hotspot": ("ff00a5ff", 1.5),
     "strip": ("ffa56700", 2.0),
+    "object": ("ff0080ff", 1.0),
     "contact": ("ffa56700", 1.0),
     "missed_target": ("ff0000ff", 1.0),
 }

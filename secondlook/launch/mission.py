@@ -12,8 +12,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
-import shapely
-
 from comms.drive import Drive, Setup
 from comms.errors import FleetError, NodeError, RunawayError
 from comms.lockstep.drive import Lockstep
@@ -27,6 +25,7 @@ from secondlook.files import CannotWriteError, passing_folder, room_kept, write_
 from secondlook.fleet.build import Fleet, build_fleet
 from secondlook.fleet.link import deck_ms_of, modem_configs
 from secondlook.fleet.nodes import OBSERVER, RECORDER, NodeSpec, make_node, node_spec
+from secondlook.fleet.survey_area import region_of
 from secondlook.launch.processes import Processes, RunFailedError, RunInterruptedError
 from secondlook.launch.run_display import ending_of
 from secondlook.launch.run_folder import log_to_file
@@ -44,8 +43,7 @@ from viz.recorder_config import RecorderConfig
 
 def recorder_config(scenario: Scenario, path: Path, live_pipe: Path | None = None) -> RecorderConfig:
     """For a recording at `path`, and a live view behind `live_pipe`."""
-    area = scenario.area
-    grounds = priority_grounds(shapely.Polygon(area.polygon_m, area.holes_m), area.priorities)
+    grounds = priority_grounds(region_of(scenario).polygon, scenario.area.priorities)
     modem = next(iter(modem_configs(scenario).values()), None)
     return RecorderConfig(
         path,

@@ -199,7 +199,7 @@ def _battery_left(scenario: Scenario, name: str, over_s: float, surveys: Sequenc
     middle = region_of(scenario).polygon.centroid
     home_s = math.dist((middle.x, middle.y), vehicle.home_m) / vehicle.speed_mps
     comes_home_s = vehicle.endurance_s - vehicle.kept_s - MARGIN_S
-    rests_s = over_s if over_s + home_s <= comes_home_s else min(over_s, comes_home_s)
+    rests_s = over_s if over_s + home_s <= comes_home_s else max(0.0, min(over_s, comes_home_s))
     return max(0.0, 1 - rests_s / vehicle.endurance_s)
 
 

@@ -316,7 +316,7 @@ class Metrics:
         if vehicle.mode is Mode.EMPTY:  # whatever its agent, which may have been started anew, makes of it
             return
         vehicle.mode, vehicle.battery = state.mode, state.battery
-        vehicle.has_finished |= state.mode is Mode.FINISHED
+        vehicle.has_finished |= state.mode is Mode.FINISHED and vehicle.has_surveyed_all
         if state.mode in (Mode.HOME, Mode.EMPTY):
             self._rest(vehicle, state.mode, sent_ms)
         else:

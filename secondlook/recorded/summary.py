@@ -12,7 +12,6 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-import shapely
 
 from comms.result import STRIP_TO_TASK, BusResult
 from planner.clearance import CAUTIOUS_MINES
@@ -110,9 +109,8 @@ def _priorities(scenario: Scenario, metrics: Metrics) -> list[dict[str, float | 
         return []
     after = RiskMap.of(metrics.now_ms / 1000, metrics)
     risk, seen = metrics.map_primary_alone()
-    grounds = priority_grounds(
-        shapely.Polygon(scenario.area.polygon_m, scenario.area.holes_m), scenario.area.priorities
-    )
+    assert metrics.area is not None
+    grounds = priority_grounds(metrics.area.polygon, scenario.area.priorities)
     return [
         {
             "weight": one.weight,

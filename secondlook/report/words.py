@@ -146,7 +146,9 @@ def _plans(mission: RecordedMission) -> Iterator[Moment]:
 
 def _found(mission: RecordedMission) -> Iterator[Moment]:
     for first in mission.said(Hotspot)[:1]:
-        yield Moment(first.t_s, f"{first.vehicle} tells of the first badly seen place, and goes on surveying")
+        goes_on = any(one.mode is Mode.SURVEY and one.begun_s > first.t_s for one in mission.activities)
+        then = ", and goes on surveying" if goes_on else ""
+        yield Moment(first.t_s, f"{first.vehicle} tells of the first badly seen place{then}")
 
 
 def _begun_and_done(mission: RecordedMission) -> Iterator[Moment]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, ValidationInfo, field_validator
@@ -140,11 +140,9 @@ class Area(Mapping):
     ) -> tuple[tuple[Point, ...], ...] | None:
         for zone in keep_out_m or ():
             _check_outline(zone)
-        if keep_out_m and "polygon_m" in info.data and "holes_m" in info.data:
-            area = Polygon(info.data["polygon_m"], info.data["holes_m"])
-            left = area.difference(union_all([Polygon(zone) for zone in keep_out_m]))
-            if left.area < SMALLEST_PRIORITY_M2:
-                raise refused("must leave some of the area to survey")
+        is_known = "polygon_m" in info.data and "holes_m" in info.data
+        if keep_out_m and is_known and _surveyed(info.data, keep_out_m).area < SMALLEST_PRIORITY_M2:
+            raise refused("must leave some of the area to survey")
         return keep_out_m or None
 
     @property
@@ -155,8 +153,8 @@ class Area(Mapping):
     @field_validator("priorities")
     @classmethod
     def _check_priorities(cls, priorities: tuple[Priority, ...], info: ValidationInfo) -> tuple[Priority, ...]:
-        if "polygon_m" in info.data and "holes_m" in info.data:
-            area = Polygon(info.data["polygon_m"], info.data["holes_m"])
+        if all(key in info.data for key in ("polygon_m", "holes_m", "keep_out_m")):
+            area = _surveyed(info.data, info.data["keep_out_m"])
             if any(area.intersection(Polygon(one.polygon_m)).area < TOLERANCE for one in priorities):
                 raise refused("must each share ground with what is surveyed")
         return priorities
@@ -173,6 +171,12 @@ class Area(Mapping):
         if across_m * along_m / cell_m**2 > LARGEST_GRID_CELLS:
             raise refused(f"must be larger, the map would have more than {LARGEST_GRID_CELLS} cells")
         return cell_m
+
+
+def _surveyed(area: dict[str, Any], keep_out_m: tuple[tuple[Point, ...], ...] | None) -> BaseGeometry:
+    """What is surveyed of an area that is outside all zones."""
+    whole = Polygon(area["polygon_m"], area["holes_m"])
+    return whole.difference(union_all([Polygon(zone) for zone in keep_out_m or ()]))
 
 
 def _extent_m(polygon_m: tuple[Point, ...], track_heading_deg: float | Literal["auto"]) -> tuple[float, float]:

@@ -31,7 +31,8 @@ FARTHEST_KM = 100
 Latitude = Annotated[float, Field(ge=-90, le=90)]
 Longitude = Annotated[float, Field(ge=-180, le=180)]
 # Beyond, a metre of easting is more degrees than a map can show.
-OriginLatitude = Annotated[float, Field(ge=-89, le=89)]
+FARTHEST_ORIGIN_DEG = 89
+OriginLatitude = Annotated[float, Field(ge=-FARTHEST_ORIGIN_DEG, le=FARTHEST_ORIGIN_DEG)]
 
 Point = Annotated[tuple[Latitude, Longitude], BeforeValidator(check_pair), Field(strict=False)]
 Corners = Annotated[tuple[Point, ...], Field(strict=False, min_length=3, max_length=MOST_CORNERS)]
@@ -365,6 +366,10 @@ def _turn(
         if checked.easting_m is not None and checked.northing_m is not None:
             epsg = _epsg(data, path, checked.epsg)
             place_deg = utm_to_degrees(epsg, checked.easting_m, checked.northing_m)
+            if not abs(place_deg[1]) <= FARTHEST_ORIGIN_DEG:
+                to_deg = f"-{FARTHEST_ORIGIN_DEG} to {FARTHEST_ORIGIN_DEG}"
+                must = f"must lie at latitude {to_deg}, and lies at {place_deg[1]:.4f}"
+                raise RefusedError((*path, "northing_m"), checked.northing_m, must)
             holder["longitude_deg"], holder["latitude_deg"] = (round(one, 9) for one in place_deg)
         return
     try:

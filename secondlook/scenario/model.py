@@ -53,14 +53,14 @@ class Mission(Mapping):
         default_factory=lambda data: None if data.get("deadline_s") else DEADLINE_FACTOR,
         json_schema_extra={"default": DEADLINE_FACTOR},
     )
-    """The mission is over at the latest at so many times the survey's duration, of several the last one's. Not beside
-    `deadline_s`, or null."""
+    """The mission is over at the latest at so many times the survey's duration, of several the last one's; with a link
+    counted from when the coordinator hears that it has ended. Not beside `deadline_s`, or null."""
     time_limit_s: Annotated[Duration, Field(validate_default=True)] = 20_000.0
     """The run fails if it is not over by then."""
     rho: Share = 0.0
     """Correlation of looks in the residual risk: 0 independent, as in the paper, 1 only the best look counts."""
     separation_m: Annotated[float, Field(ge=0, le=1000)] = 12.0
-    """Helpers give way to whom they would come nearer; 0: they need not."""
+    """Helpers give way to whom they would come nearer, but not on their way home; 0: they need not."""
     goal: AnyGoal | None = None
     """What it is flown for: it ends as soon as that is reached. Left out, it goes on while a second look is worth it,
     or until its deadline. Not with a `link`, as contacts do not cross the water."""

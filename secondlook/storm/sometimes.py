@@ -192,6 +192,7 @@ REASONS: Mapping[str, str] = MappingProxyType(
         "a helper says done, and the map says no": " says done, but saw ",
         "a helper says done before its looks have come": " says so, its looks are to come",
         "a helper has left a strip before its looks have come": "; its looks are to come",
+        "a helper says late that it had served a strip": " had served it, its looks are to come",
         "a strip is no longer worth it": "no longer worth a second look, or part of another strip",
         "a strip is left when the mission is over": f"{LEFT}: ",
         "a strip is left that nobody has served": "nobody has served it",

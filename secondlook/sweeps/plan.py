@@ -88,6 +88,8 @@ class SweepPlan:
         """
         if not self.seeds:
             raise UserError("seeds: are none; must be at least one")
+        if self.seeds != range(self.seeds[0], self.seeds[-1] + 1):
+            raise UserError(f"seeds: {self.seeds} is not allowed; must be a range of step 1")
         if self.count > MOST_MISSIONS or self.count > MOST_COMBINATIONS * len(self.seeds):
             raise UserError(
                 f"{self.count} missions are not allowed; must be at most {MOST_COMBINATIONS} combinations "

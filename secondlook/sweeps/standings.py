@@ -135,7 +135,7 @@ def _text(value: Any) -> str:
     """The same for a value that was asked for and for its cell: 2 and 2.0, a list and its text."""
     if isinstance(value, str):
         return value
-    return f"{value:g}" if isinstance(value, float) and value.is_integer() else as_text(value)
+    return as_text(int(value) if isinstance(value, float) and value.is_integer() else value)
 
 
 def _is_number(kind: pa.DataType) -> bool:

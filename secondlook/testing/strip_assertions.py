@@ -257,6 +257,7 @@ def assert_strips_offered_within(flight: Flight, within_s: float) -> None:
     serving: dict[int, str] = {}
     helpers = {one.vehicle for one in flight.run.vehicles if one.role.revisits}
     told: set[int] = set()
+    kills = sorted((one for one in flight.events if isinstance(one, Kill)), key=lambda one: -one.at_ms)
     for one in flight.heard:
         now_ms, message = one.header.sent_ms, one.message
         free = {vehicle: since_ms for vehicle, since_ms in idle_since.items() if vehicle not in serving.values()}
@@ -282,9 +283,8 @@ def assert_strips_offered_within(flight: Flight, within_s: float) -> None:
                 open_since.pop(number, None)
             if message.state in WITH_A_VEHICLE:
                 serving[number] = message.vehicle
-        for kill in flight.events:
-            if isinstance(kill, Kill) and kill.at_ms <= now_ms:
-                idle_since.pop(kill.node_id, None)
+        while kills and kills[-1].at_ms <= now_ms:
+            idle_since.pop(kills.pop().node_id, None)
     fail_if(problems, "strips wait for a helper that is free")
 
 

@@ -869,6 +869,33 @@ class TestWhoIsAtAnother:
             assert lives.due() == [(Item.CUT, 0, 7_000)]
             assert 7_000 + looks_within_ms in lives.life.deadlines_ms()
 
+    @pytest.mark.parametrize(
+        ("name", "looks_within_ms", "moved", "left"),
+        [
+            (HELPER, 80_000, False, DONE),
+            (HELPER, 0, False, OPEN),  # the map tells
+            (HELPER, 80_000, True, OPEN),  # it has served what is another strip now
+            (SECOND_HELPER, 80_000, False, OPEN),  # who never had it
+        ],
+    )
+    def test_or_done_after_all_when_its_word_that_it_has_served_it_comes_behind(
+        self, name: str, looks_within_ms: int, moved: bool, left: StripState
+    ) -> None:
+        lives = self.with_both(TaskState.ACCEPTED, looks_within_ms=looks_within_ms)
+        lives.tell(HELPER, 2, TaskState.ACCEPTED, 7_000)
+        assert lives.states() == [OPEN, ACCEPTED]
+        if moved:
+            record = lives.strip(1)
+            lives.ledger.revise(record, replace(record.strip, length_m=30.0), record.cut)
+        lives.forget()
+        lives.tell(name, 1, TaskState.DONE, 8_000)
+        assert lives.states() == [left, ACCEPTED]
+        assert (Item.CUT, 0, 8_000) in lives.due()
+        if left is DONE:
+            assert lives.said() == [(f"{HELPER} had served it, its looks are to come", DONE, 1)]
+            assert lives.strip(1).vehicle == HELPER
+            assert 88_000 in lives.life.deadlines_ms()
+
     def test_but_not_by_a_word_older_than_one_on_the_other(self) -> None:
         lives = self.with_both()
         old = lives.header(HELPER)

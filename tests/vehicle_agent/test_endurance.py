@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 
 import pytest
-from by_hand import PRIMARY, nav, run_info
+from by_hand import HELPER, PRIMARY, nav, run_info
 from one_node import OneNode
 
 from comms.said.announcement import Role, RunInfo, Vertex, Zone
@@ -21,6 +21,10 @@ from comms.said.messages import (
     Mode,
     Nav,
     Plan,
+    Task,
+    TaskAction,
+    TaskState,
+    TaskStatus,
 )
 from planner.currents import Sailing
 from planner.dubins import Pose
@@ -29,8 +33,9 @@ from planner.spacing_planners import AdaptiveSpacing, FixedSpacing, SpacingPlann
 from planner.sweep import pass_over
 from planner.types import SonarShape
 from planner.way_home import WayHome
-from vehicle_agent.config import Homing, SurveyConfig
+from vehicle_agent.config import Homing, RevisitConfig, SurveyConfig
 from vehicle_agent.endurance import Endurance
+from vehicle_agent.revisit import RevisitAgent
 from vehicle_agent.survey import SurveyAgent
 
 NORTH = 0.0
@@ -208,3 +213,17 @@ def test_round_ground_to_keep_out_of_it_is_farther_home_and_who_is_refused_asks_
     assert (again.number, again.kind) == (number + 1, ManeuverKind.GOTO)
     assert (again.end_x_m, again.end_y_m) == (0, 0)
     assert node.all(AgentState)[-1].mode is Mode.RETURNING
+
+
+def test_who_has_served_a_strip_goes_home_at_once_where_it_has_no_time_to_circle_until_its_next_report() -> None:
+    # 500 m from home, 250 s, with 10 s to spare and 31 s for a circle: at 231 s it is time, by 22 s.
+    sees = SideLooking(SonarShape("side", 0, 25))
+    config = RevisitConfig(HELPER, sees, speed_mps=2, turn_radius_m=10, run_in_m=5, endurance_ms=500_000, homing=HOME)
+    node = OneNode(RevisitAgent(config), Role.REVISIT)
+    node.hear("run", RUN)
+    node.hear(f"veh/{HELPER}/nav", nav(0, 0))
+    node.hear(f"coord/task/{HELPER}/1", Task(TaskAction.TAKE, 7, 100, 50, 0.0, 100, 50))
+    node.hear(f"veh/{HELPER}/nav", nav(0, 500), at_ms=231_000)
+    node.hear(f"veh/{HELPER}/maneuver_status", ManeuverStatus(1, ManeuverState.DONE, 0, ""))
+    assert node.last(TaskStatus).state is TaskState.DONE
+    assert node.last(AgentState).mode is Mode.RETURNING

@@ -193,6 +193,14 @@ class TestAWordRepeated:
         assert agent.all(TaskStatus, agent.hear(f"coord/task/{HELPER}/1", STRIP, sent_ms=4999)) == []
         assert agent.all(TaskStatus, agent.hear(f"coord/task/{HELPER}/2", STRIP, sent_ms=5000)) != []
 
+    def test_one_of_the_second_of_its_start_is_for_it_as_by_modem_no_more_is_known(self) -> None:
+        config = RevisitConfig(HELPER, SEES, speed_mps=2, turn_radius_m=6, run_in_m=5, endurance_ms=14_400_000)
+        agent = OneNode(RevisitAgent(config), Role.REVISIT, now_ms=5166)
+        agent.hear("run", RUN, at_ms=5167, sent_ms=0)
+        agent.hear(f"veh/{HELPER}/nav", nav(100, 0))
+        assert agent.all(TaskStatus, agent.hear(f"coord/task/{HELPER}/1", STRIP, sent_ms=4999)) == []
+        assert agent.all(TaskStatus, agent.hear(f"coord/task/{HELPER}/2", STRIP, sent_ms=5000)) != []
+
     def test_a_word_on_a_manoeuvre_of_its_predecessor_is_none_on_its_own(self) -> None:
         config = RevisitConfig(HELPER, SEES, speed_mps=2, turn_radius_m=6, run_in_m=5, endurance_ms=14_400_000)
         agent = OneNode(RevisitAgent(config), Role.REVISIT, now_ms=895_700)

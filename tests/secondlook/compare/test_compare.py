@@ -83,6 +83,8 @@ class TestWhoIsCompared:
         assert equal_end.scenario.mission.deadline_factor == 1.05
         # A primary for T and two helpers for 1.05 T each are 3.1 T of one primary.
         assert longer.scenario.mission.deadline_factor == pytest.approx(3.1)
+        limits_s = [one.scenario.mission.time_limit_s for one in (equal_end, longer)]
+        assert limits_s[1] == pytest.approx(limits_s[0] * 3.1 / 1.05)  # else the limit would end what takes longer
 
     def test_vehicle_seconds_are_shared_by_all_primaries(self) -> None:
         assert equal_vehicle_seconds(load_scenario("wide")) == pytest.approx(1 + 1.05 * 8 / 3)

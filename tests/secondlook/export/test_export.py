@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -93,6 +94,13 @@ def test_gdal_finds_everything_where_it_was_to_the_millimetre(exported: Path, mi
     for geometry, properties in by_kind["path"]:
         flown = mission.paths[str(properties["vehicle"])].line
         assert shapely.hausdorff_distance(shapely.LineString(metres(geometry)), flown) < 0.5 + MILLIMETRE
+
+
+def test_what_is_drawn_has_a_style_of_its_own(exported: Path) -> None:
+    text = (exported / "mission.kml").read_text()
+    named = set(re.findall(r"<styleUrl>#(\w+)</styleUrl>", text))
+    assert "object" in named
+    assert named <= set(re.findall(r'<Style id="(\w+)">', text))
 
 
 def test_times_are_told_in_utc_where_the_mission_has_a_start(exported: Path, mission: RecordedMission) -> None:

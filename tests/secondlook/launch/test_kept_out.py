@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import shapely
 from flights import BRIEF
 
 from comms.said.messages import ManeuverState, ManeuverStatus, Plan, StripState
@@ -147,6 +148,19 @@ def test_in_the_harbour_all_stay_out_and_apart_and_come_home(tmp_path: Path) -> 
     (fairway,) = flight.summary["priorities"]
     assert fairway["mean"] < 0.7 * fairway["mean_primary_alone"]
     assert fairway["mean"] < flight.summary["risk"]["mean"]
+
+
+def test_of_ground_that_counts_more_what_lies_in_a_zone_does_not_count(tmp_path: Path) -> None:
+    ground = [[100, 20], [180, 20], [180, 80], [100, 80]]
+    area = {
+        "area.keep_out_m": [[[120, 20], [180, 20], [180, 60], [120, 60]]],
+        "area.priorities": [{"polygon_m": ground, "weight": 3}],
+    }
+    flight = Fleet(BRIEF, folder=tmp_path, overrides=area, record=True).run()
+    (told,) = flight.summary["priorities"]
+    assert told["area_m2"] == 80 * 60 - 60 * 40
+    (read,) = load(flight.folder).priorities
+    assert told["mean"] == pytest.approx(load(flight.folder).risk().mean_within(shapely.Polygon(*read.outlines_m)))
 
 
 def test_in_the_harbour_there_is_a_way_to_all_of_it() -> None:

@@ -221,6 +221,9 @@ class TestBatteries:
         # A tenth is its reserve, and it has 10 s to spare.
         assert expected.battery_left["helper"] == pytest.approx(310 / 3000)
 
+    def test_nobody_has_more_than_all_of_its_battery_left(self) -> None:
+        assert check_mission("tellaro", ["vehicles.helper.endurance_s=1"]).battery_left["helper"] == 1.0
+
 
 _RING = (
     [[-60, -60], [-50, -60], [-50, 160], [-60, 160]],

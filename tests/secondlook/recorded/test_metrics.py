@@ -97,6 +97,15 @@ class TestBatteries:
         assert self.told(stream, PRIMARY) == ("home", 30.0, 0.2)
         assert stream.metrics.summary()["vehicles"][PRIMARY]["survey_cut_short"] is True
 
+    def test_one_that_has_flown_a_part_of_its_tracks_when_the_mission_is_over_was_cut_short(self) -> None:
+        stream = begun()
+        tracks = tuple(PlannedTrack(n, 0, 0, 0, 0, 200, n == 1) for n in (1, 2))
+        stream.say(1, f"agent/{PRIMARY}/plan", Plan(1, tracks, (120,), (), ""))
+        self.state(stream, 10, PRIMARY, Mode.SURVEY, 0.5)
+        stream.say(20, "coord/mission_over", MissionOver("the deadline is reached, the survey is not finished"))
+        self.state(stream, 20, PRIMARY, Mode.FINISHED, 0.5)
+        assert stream.metrics.summary()["vehicles"][PRIMARY]["survey_cut_short"] is True
+
     def test_a_survey_that_was_finished_before_was_not_cut_short(self) -> None:
         stream = begun()
         self.state(stream, 10, PRIMARY, Mode.FINISHED, 0.5)

@@ -348,6 +348,9 @@ class TestFromPython:
         ("terms", "told"),
         [
             ({"seeds": range(0)}, "seeds: are none"),
+            ({"seeds": range(1, 6, 2)}, "seeds: range(1, 6, 2) is not allowed; must be a range of step 1"),
+            ({"seeds": range(3, 0, -1)}, "must be a range of step 1"),
+            ({"seeds": [1, 5, 9]}, "seeds: [1, 5, 9] is not allowed"),
             ({"vary": {"mission.rho": [0, 0]}}, "vary mission.rho: 0 is not allowed twice"),
             ({"vary": {"mission.rho": []}}, "vary mission.rho: has no value"),
             ({"settings": ["mission.rho"]}, "must be KEY=VALUE"),
