@@ -162,6 +162,10 @@ def run_recorder(scenario: Scenario, link: Link, folder: Path) -> int:
             failure = outcome.failure(scenario)
         except NodeError as error:
             failure = str(error)
+        except UserError:  # it has not begun, and the same command is to begin where it left nothing
+            for name in ("scenario.yaml", "events.jsonl", "messages.mpk", "mission.rrd"):
+                (folder / name).unlink(missing_ok=True)
+            raise
     summary = summarise(
         scenario,
         observer,

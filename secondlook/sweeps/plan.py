@@ -189,9 +189,12 @@ def varied(options: Sequence[str]) -> dict[str, Sequence[Value]]:
     return vary
 
 
-def checked(vary: Mapping[str, Sequence[Value]]) -> dict[str, Sequence[Value]]:
-    """What is to be varied, by key; raises UserError for a key without values, or with one twice."""
+def checked(vary: Mapping[str, Any]) -> dict[str, Sequence[Value]]:
+    """What is to be varied, by key; raises UserError for what is no list of values, for a key without any, or with one
+    twice."""
     for key, values in vary.items():
+        if isinstance(values, str) or not isinstance(values, Sequence):
+            raise UserError(f"vary {key}: {values!r} is not allowed; must be a list of values")
         _check(key, values, f"vary {key}")
     return {key: list(values) for key, values in vary.items()}
 

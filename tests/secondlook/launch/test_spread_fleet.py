@@ -108,6 +108,10 @@ def test_an_endpoint_where_nobody_listens_is_told_in_one_sentence(fleet: SpreadF
     world = fleet.node("world", more=["--wait", "0.3"])
     assert world.ends() == 2
     assert world.said == f"no connection to {fleet.endpoint} within 0.3 s: nobody listens there\n"
+    for name in ("recorder", "again"):  # the same command: nothing is left in its folder
+        recorder = fleet.node("recorder", name=name, more=["--wait", "0.3"])
+        assert recorder.ends() == 2
+        assert recorder.said == world.said
 
 
 def test_a_recorder_that_has_heard_nothing_tells_where_to_look() -> None:

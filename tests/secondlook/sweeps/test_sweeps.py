@@ -352,6 +352,8 @@ class TestFromPython:
             ({"seeds": range(3, 0, -1)}, "must be a range of step 1"),
             ({"seeds": [1, 5, 9]}, "seeds: [1, 5, 9] is not allowed"),
             ({"vary": {"mission.rho": [0, 0]}}, "vary mission.rho: 0 is not allowed twice"),
+            ({"vary": {"mission.rho": 0.5}}, "vary mission.rho: 0.5 is not allowed; must be a list of values"),
+            ({"vary": {"vehicles.primary.spacing": "fixed"}}, "spacing: 'fixed' is not allowed; must be a list"),
             ({"vary": {"mission.rho": []}}, "vary mission.rho: has no value"),
             ({"settings": ["mission.rho"]}, "must be KEY=VALUE"),
         ],
