@@ -174,6 +174,12 @@ class Sailing:
         return self.drift_mps == 0.0
 
     @property
+    def is_known(self) -> bool:
+        """Whether what it makes good is known, and not only what is slowest: in still water and where the water always
+        flows alike."""
+        return not self.tidal and (self.grid is None or self.grid.time_s.size == 1)
+
+    @property
     def slowest_mps(self) -> float:
         """What it makes good right against the stream."""
         return self.speed_mps - self.drift_mps

@@ -158,7 +158,7 @@ def survey_course(
         begin, end = pass_of(ahead.pop(0), entry)
         left_s = max(0.0, state.expected_end_ms / 1000 - heard_s)
         left_m = left_s / sailing.straight_s(1.0, end) + entry.run_in_m
-        if not sailing.is_in_still_water:  # what it makes good until then is known less
+        if not sailing.is_known:  # what it makes good until then
             left_m = run_out_left_m(end, pose, math.dist(begin[:2], end[:2])) or left_m
         pose = shifted(end[:2], end.heading_rad, -left_m)
     else:

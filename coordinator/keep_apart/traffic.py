@@ -260,7 +260,7 @@ class Traffic:
 def _is_off(vehicle: KnownVehicle, laid: Course) -> bool:
     """Whether a vehicle was heard somewhere else than its course leads, in a current of which not all is known."""
     state, heard_s = vehicle.state, vehicle.heard_ms / 1000
-    if state is None or vehicle.sailing.is_in_still_water or heard_s <= laid.start_s:
+    if state is None or vehicle.sailing.is_known or heard_s <= laid.start_s:
         return False
     return math.dist(laid.at(heard_s)[:2], (state.x_m, state.y_m)) > OFF_COURSE_M
 

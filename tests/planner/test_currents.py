@@ -184,6 +184,13 @@ def alike(east_mps: float, north_mps: float) -> FlowGrid:
     return FlowGrid(*places, np.array([0.0]), np.full((1, 2, 3), east_mps), np.full((1, 2, 3), north_mps))
 
 
+def test_what_is_made_good_is_known_where_the_water_always_flows_alike() -> None:
+    at_two_times = replace(alike(0.5, 0.0), time_s=np.array([0.0, 60.0]))
+    known = [Sailing(2), Sailing(2, 0.5), Sailing(2, 0.5, grid=alike(0.5, 0.0))]
+    assert [one.is_known for one in known] == [True] * 3
+    assert [one.is_known for one in (Sailing(2, 0.5, tidal=True), Sailing(2, 0.5, grid=at_two_times))] == [False] * 2
+
+
 class TestFlowsFromPlaceToPlace:
     @pytest.mark.parametrize(
         ("time_s", "place", "east_mps"),

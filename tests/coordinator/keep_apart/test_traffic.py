@@ -483,8 +483,13 @@ class TestInATide:
         assert anew.at(20)[:2] == pytest.approx((0, -40))
         assert anew.arrives_s == pytest.approx(20 + 165)
 
-    def test_in_still_water_it_is_where_it_was_expected_whatever_it_says_of_its_place(self) -> None:
+    @pytest.mark.parametrize("drift_mps", [0.0, 1.0])
+    def test_where_the_water_flows_as_is_known_it_is_where_it_was_expected_whatever_is_heard(
+        self, drift_mps: float
+    ) -> None:
+        # By modem places are reckoned without a current.
         traffic, one = Traffic(), helper()
+        one = replace(one, entry=replace(one.entry, drift_mps=drift_mps, set_rad=NORTH))
         self.heard(traffic, one, Mode.TRANSIT, 0, 0)
         entered = self.heard(traffic, one, Mode.REVISIT, 20, 10)
         assert self.heard(traffic, one, Mode.REVISIT, 70, 20) is entered
