@@ -73,6 +73,7 @@ class TestTheTimeLeft:
         assert known.time_m(50_000) == pytest.approx((14_400 - 10) * 2)  # what its battery lasts, less 10 s
         known.survey_ends(1_000_000)
         assert known.time_m(50_000) == pytest.approx((1050 - 50) * 2)
+        assert known.time_m(1_060_000) == 0.0
         assert known.time_m(1_050_000) == known.time_m(2_000_000) == 0
 
     def test_the_battery_ends_it(self) -> None:
@@ -168,6 +169,9 @@ def test_who_has_failed_too_often_or_is_on_its_way_home_is_not_told_of_even_wher
     for failures, told in ((MOST_FAILURES - 1, 1), (MOST_FAILURES, 0)):
         helper.failures = failures
         assert len(known.situation(60_000).helpers) == told
+    helper.failures = 0
+    helper.lost = True
+    assert known.situation(60_000).helpers == ()
     known = Known()
     at_work(known)
     assert len(known.situation(60_000).helpers) == 1

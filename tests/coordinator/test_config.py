@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coordinator.config import weights_over
+from coordinator.allocate.simple import GreedyAllocator
+from coordinator.config import CoordinatorConfig, weights_over
 from planner.types import GridSpec, PriorityGround, SweepFrame
 
 GRID = GridSpec(SweepFrame(0, 0, 0), 10, 4, 6)  # 40 m across, 60 m along; cell centres 0, 10, 20, 30 and 5 to 55
@@ -39,6 +40,17 @@ def test_what_all_of_the_area_counts_changes_nothing(weight: float) -> None:
 def test_where_nothing_counts_it_stays_nothing() -> None:
     around = PriorityGround((((-50.0, -50.0), (90.0, -50.0), (90.0, 90.0), (-50.0, 90.0)),), 0.0)
     assert (weights_over(GRID, ALL, [around]) == 0).all()
+
+
+def test_of_a_map_without_a_cell_in_the_area_weights_are_as_they_were_told() -> None:
+    south = PriorityGround((((-100.0, -100.0), (100.0, -100.0), (100.0, 20.0), (-100.0, 20.0)),), 3.0)
+    weights = weights_over(GRID, ~ALL, [south])
+    assert (weights[:2].min(), weights[2:].max()) == (3.0, 1.0)
+
+
+def test_where_nobody_says_otherwise_there_is_no_link_and_looks_come_before_the_word_that_a_strip_is_done() -> None:
+    config = CoordinatorConfig(GreedyAllocator(), 1.05, 30_000, 30_000, 30, 400, 0.3, 0.2)
+    assert (config.looks_within_ms, config.ahead_ms) == (0, 0)
 
 
 @pytest.mark.parametrize("heading_deg", [0.0, 30.0, 90.0])

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
-from planner.dubins import TIE_M, DubinsPath, Pose, compass_rad, path_lengths_m, shortest_path
+from planner.dubins import TIE_M, DubinsPath, Pose, _turns, compass_rad, path_lengths_m, shortest_path
 
 NORTH, EAST, SOUTH, WEST = 0.0, math.pi / 2, math.pi, 3 * math.pi / 2
 
@@ -278,3 +278,8 @@ def test_who_turns_round_on_its_line_does_so_to_port_however_that_is_rounded(
     start = Pose(off_m[0], off_m[1], turned_rad + off_rad[0])
     end = Pose(x_m + off_m[2], y_m + off_m[3], turned_rad + math.pi + off_rad[1])
     assert shortest_path(start, end, 12.0).turns[0] == -1
+
+
+def test_an_angle_just_short_of_many_full_turns_is_none_and_not_less() -> None:
+    # Its 39 turns are rounded up: 3e-14 is lacking.
+    assert _turns(np.array([-245.04422698000388])) == 0.0

@@ -105,6 +105,13 @@ def test_a_helper_does_not_wait_for_a_strip_for_longer_than_another_takes(name: 
     assert offers(name, told) == {"alpha": 3 - number}
 
 
+@pytest.mark.parametrize(("wait_s", "number"), [(10.0, 1), (60.0, 2)])
+def test_in_an_auction_a_wait_counts_as_time(wait_s: float, number: int) -> None:
+    # 40 m farther is 20 s farther.
+    told = situation([open_strip(strip(1)), open_strip(strip(2, y_m=140))], [helper(waits_s={1: wait_s})])
+    assert offers("auction", told) == {"alpha": number}
+
+
 @pytest.mark.parametrize("name", [name for name in ALLOCATORS if name != "none"])
 class TestEveryAllocator:
     def test_one_helper_and_one_strip(self, name: str) -> None:
