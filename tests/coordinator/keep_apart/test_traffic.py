@@ -504,3 +504,16 @@ class TestInATide:
             course = Traffic().course(replace(one, entry=entry), None, 20)
             assert course is not None
             assert course.at(20)[:2] == pytest.approx((0, y_m))
+
+    @pytest.mark.parametrize(("y_m", "is_anew"), [(29.9, False), (40.0, True)])
+    def test_a_primary_that_is_ahead_of_its_course_is_expected_on_from_there(self, y_m: float, is_anew: bool) -> None:
+        traffic, one = Traffic(), surveyor()
+        one.entry = replace(one.entry, speed_mps=1.5, drift_mps=0.5, set_rad=NORTH, is_tidal=True)
+        first = traffic.course(one, None, 0)
+        assert first is not None
+        assert first.at(20)[:2] == pytest.approx((0, 20))
+        one.state, one.heard_ms = surveyor(y_m=y_m).state, 20_000
+        anew = traffic.course(one, None, 20)
+        assert anew is not None
+        assert (anew is not first) == is_anew
+        assert anew.at(20)[:2] == pytest.approx((0, y_m if is_anew else 20))
