@@ -4,8 +4,8 @@ python -m bench.restarts [SCENARIO] [--times N] [--factor F] [--jobs J] [--node 
 
 Starts a fleet with `secondlook node`, each process with `--state` and `--restart on-failure`, kills one of them with
 SIGKILL in one phase of the mission, and flies to the end: nobody N times, then every node in every phase, N times each.
-Tells the residual risk at the end, how many seconds of the mission the node was away, and whatever was
-lost: a number that was given twice, a strip left out of the books, a process that did not end well.
+Tells the residual risk at the end, how many seconds of the mission the node was away, and whatever was lost: a number
+that was given twice, a strip left out of the books, a process that did not end well.
 """
 
 from __future__ import annotations

@@ -13,8 +13,7 @@ from coordinator.cut.strips import Counted
 from coordinator.fleet import KnownFleet
 from coordinator.ledger import Ledger, StripRecord
 from coordinator.sectors import Sector
-from coordinator.vehicles import KnownVehicle, way_home_of
-from planner.dubins import Pose
+from coordinator.vehicles import KnownVehicle, pose_of, way_home_of
 from planner.footprints import footprint_of
 from planner.types import Strip
 from planner.way_home import MARGIN_S
@@ -84,7 +83,7 @@ class Briefing:
         record = following or self._ledger.strip_of(entry.vehicle)
         if record is None and not vehicle.is_idle:
             return None
-        pose = Pose(state.x_m, state.y_m, state.heading_rad)
+        pose = pose_of(state)
         free_at, free_ms = pose, now_ms
         if record is not None:
             expected = vehicle.offers[record.strip.number].service

@@ -141,9 +141,9 @@ class StripLife:
             return
         record, name = self.ledger.get(status.strip), vehicle.entry.vehicle
         if record is None or record.vehicle != name or record.state not in TAKEN:
-            if record is not None and status.state is TaskState.DONE and self._was_served(record, vehicle):
-                self._await_looks(record, now_ms, f"{name} had served it, its looks are to come", name)
             if status.state is TaskState.DONE:  # by one that counted as lost: the map tells what is left
+                if record is not None and self._was_served(record, vehicle):
+                    self._await_looks(record, name, now_ms, f"{name} had served it, its looks are to come")
                 self._sectors.cut_by(now_ms, None if record is None else [record.window])
             elif status.state is not TaskState.REFUSED and record is not None and record.vehicle == name:
                 self._await_no_more(record, now_ms)
@@ -300,7 +300,9 @@ class StripLife:
                 self._move(other, StripState.DONE, now_ms, f"seen by {name}, which is at strip {number}", name)
                 self._sectors.cut_by(now_ms, [other.window])
             elif self._may_be_done(other, vehicle):
-                self._await_looks(other, now_ms, f"left by {name}, which is at strip {number}; its looks are to come")
+                self._await_looks(
+                    other, name, now_ms, f"left by {name}, which is at strip {number}; its looks are to come"
+                )
                 self._sectors.cut_by(now_ms, [other.window])
             else:
                 self._move(other, StripState.OPEN, now_ms, f"{name} is at strip {number}")
@@ -317,7 +319,7 @@ class StripLife:
                     vehicle.failures = 0
                     self._move(record, StripState.DONE, now_ms, f"seen by {name}, whose word on it was lost", name)
                 elif self._may_be_done(record, vehicle):
-                    self._await_looks(record, now_ms, f"left by {name}, which has no work; its looks are to come")
+                    self._await_looks(record, name, now_ms, f"left by {name}, which has no work; its looks are to come")
                 else:
                     vehicle.note_failure()
                     self._move(record, StripState.OPEN, now_ms, f"{name} has no work, its word on it was lost")
@@ -330,7 +332,7 @@ class StripLife:
             self._learn(record)
             self._move(record, StripState.DONE, now_ms, f"{share:.0%} of it seen by {name}", name)
         elif self._looks_within_ms:
-            self._await_looks(record, now_ms, f"{name} says so, its looks are to come")
+            self._await_looks(record, name, now_ms, f"{name} says so, its looks are to come")
         else:
             vehicle.note_failure(record.window)
             self._move(record, StripState.FAILED, now_ms, f"{name} says done, but saw {share:.0%} of it", name)
@@ -353,9 +355,9 @@ class StripLife:
         is_open = record.state is StripState.OPEN
         return self._looks_within_ms > 0 and is_open and offer is not None and offer.strip == record.strip
 
-    def _await_looks(self, record: StripRecord, now_ms: int, reason: str, name: str = "") -> None:
+    def _await_looks(self, record: StripRecord, name: str, now_ms: int, reason: str) -> None:
         self._looks_due_ms[record.strip.number] = now_ms + self._looks_within_ms
-        self._move(record, StripState.DONE, now_ms, reason, name or record.vehicle)
+        self._move(record, StripState.DONE, now_ms, reason, name)
 
     def _await_no_more(self, record: StripRecord, now_ms: int) -> None:
         """What a vehicle was taken to have seen of a strip it has not: that is cut anew."""

@@ -44,7 +44,7 @@ def expected_end_ms(
     if state.mode is Mode.RETURNING:
         return max(heard_ms, state.expected_end_ms)
     ahead, sailing = [track for track in plan.tracks if not track.flown], sailing_of(entry, flows)
-    at_ms, pose = heard_ms, Pose(state.x_m, state.y_m, state.heading_rad)
+    at_ms, pose = heard_ms, pose_of(state)
     if ahead and ahead[0].number == state.works_on and state.expected_end_ms > 0:
         at_ms = max(at_ms, state.expected_end_ms)
         pose = pass_of(ahead[0], entry).end
@@ -62,6 +62,11 @@ def expected_end_ms(
         takes_s = sailing.passes_s(passes, entry.turn_radius_m, pose, keep_out)
         takes_s -= sailing.straight_s(entry.run_in_m, passes[-1].end)
     return at_ms + round(takes_s * 1000)
+
+
+def pose_of(state: AgentState) -> Pose:
+    """Where a vehicle says it is."""
+    return Pose(state.x_m, state.y_m, state.heading_rad)
 
 
 def sailing_of(entry: RosterVehicle, flows: FlowGrid | None = None) -> Sailing:

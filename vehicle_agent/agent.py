@@ -112,15 +112,18 @@ class Agent:
             self._outbox.extend(self.coverage.all_again())
             self.tell_again()
             self.report_state(now_ms)
-        if self._waits and not waited and not self._over:  # it may have turned away by the next report
-            pose = self.pose
-            if pose is not None and self.endurance.is_low(pose, now_ms, circles=True):
-                self.turn_home(now_ms)
+        if self._waits and not waited and not self._over and self._is_low(now_ms):
+            self.turn_home(now_ms)  # by its next report it may have turned away from there
         return self._step()
 
     @property
     def _waits(self) -> bool:
         return self.mode in (Mode.IDLE, Mode.FINISHED)
+
+    def _is_low(self, now_ms: int) -> bool:
+        """Whether its battery tells it to go home, once it is known where it is."""
+        pose = self.pose
+        return pose is not None and self.endurance.is_low(pose, now_ms, circles=self._waits)
 
     def on_wake(self, now_ms: int) -> Step:
         """Reports, every 10 s; asks again of a manoeuvre of which too long nothing was heard."""
@@ -128,9 +131,8 @@ class Agent:
         self._wake_ms = now_ms + REPORT_EVERY_MS
         if self._word_due_ms is not None and now_ms >= self._word_due_ms:
             self._send_maneuver()
-        pose, circles = self.pose, self._waits
         works, was_refused = not self.mode.is_out_of_work, self.mode is Mode.RETURNING and self.maneuver is None
-        if was_refused or (pose is not None and works and self.endurance.is_low(pose, now_ms, circles=circles)):
+        if was_refused or (works and self._is_low(now_ms)):
             self.turn_home(now_ms)
         else:
             self.report(now_ms)

@@ -11,7 +11,7 @@ import numpy as np
 
 from comms.said.announcement import RosterVehicle
 from comms.said.messages import AgentState, Mode, Plan
-from coordinator.vehicles import pass_of, sailing_of
+from coordinator.vehicles import pass_of, pose_of, sailing_of
 from planner.currents import FlowGrid, Sailing
 from planner.dubins import DubinsPath, Pose
 from planner.keep_out import NOWHERE, KeepOut
@@ -147,7 +147,7 @@ def survey_course(
 ) -> Course:
     """The course of a primary along all tracks that it has planned, from what it said at `heard_s`."""
     pose, radius_m, sailing = (
-        Pose(state.x_m, state.y_m, state.heading_rad),
+        pose_of(state),
         entry.turn_radius_m,
         sailing_of(entry, flows),
     )

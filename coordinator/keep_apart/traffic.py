@@ -17,7 +17,7 @@ from coordinator.keep_apart.courses import (
     survey_run_out_left_m,
     sweep_course,
 )
-from coordinator.vehicles import KnownVehicle, way_home_of
+from coordinator.vehicles import KnownVehicle, pose_of, way_home_of
 from planner.dubins import DubinsPath, Pose
 from planner.footprints import footprint_of
 from planner.keep_out import NOWHERE, KeepOut
@@ -134,7 +134,7 @@ class Traffic:
         state = vehicle.state
         assert state is not None
         laid = self.course(vehicle, strip, now_s)
-        return Pose(state.x_m, state.y_m, state.heading_rad) if laid is None else laid.at(now_s)
+        return pose_of(state) if laid is None else laid.at(now_s)
 
     def _survey(self, vehicle: KnownVehicle, now_s: float) -> Course:
         state, plan, name = vehicle.state, vehicle.plan, vehicle.entry.vehicle
@@ -143,8 +143,8 @@ class Traffic:
         told = (plan.revision if plan else 0, state.mode, state.works_on, ends_ms)
         known = self._surveys.get(name)
         # One that should have sailed its tracks, or has none yet, is where it was heard last.
-        is_known = known is not None and known[0] == told and not _is_off(vehicle, known[2])
-        if known is None or not is_known or (known[1] != vehicle.heard_ms and now_s >= known[2].arrives_s):
+        is_past = known is not None and known[1] != vehicle.heard_ms and now_s >= known[2].arrives_s
+        if known is None or known[0] != told or is_past or _is_off(vehicle, known[2]):
             laid = survey_course(vehicle.entry, state, plan, vehicle.heard_ms / 1000, self._keep_out, vehicle.flows)
             known = self._surveys[name] = told, vehicle.heard_ms, laid
         return known[2]
@@ -156,7 +156,7 @@ class Traffic:
         known = self._sweeps.get(entry.vehicle)
         if known is None or known.strip != strip or known.stage < stage:
             entered = known is not None and known.strip == strip and stage == 2
-            pose = Pose(state.x_m, state.y_m, state.heading_rad)
+            pose = pose_of(state)
             sweep = known.sweep if known and entered else self._sweep_from(pose, vehicle, strip)
             laid = self._over(vehicle, sweep.passes, entered=entered)
             known = self._sweeps[entry.vehicle] = _Sweeping(strip, stage, sweep, laid)
@@ -173,7 +173,7 @@ class Traffic:
         """Over the legs of a strip from where it was heard; `entered`: on the first of them."""
         state, entry = vehicle.state, vehicle.entry
         assert state is not None
-        pose = Pose(state.x_m, state.y_m, state.heading_rad)
+        pose = pose_of(state)
         return sweep_course(
             *(pose, vehicle.heard_ms / 1000, vehicle.sailing, entry.turn_radius_m, passes),
             entered=entered,
@@ -186,7 +186,7 @@ class Traffic:
         entry = vehicle.entry
         known = self._rests.get(entry.vehicle)
         if known is None or known[0] != vehicle.heard_ms:
-            pose, heard_s = Pose(state.x_m, state.y_m, state.heading_rad), vehicle.heard_ms / 1000
+            pose, heard_s = pose_of(state), vehicle.heard_ms / 1000
             laid = lying_still(pose, heard_s)
             if state.mode is Mode.RETURNING:
                 run_out = self._run_out(vehicle, pose)
@@ -200,7 +200,7 @@ class Traffic:
         """Laid anew from where it was heard, if that is off its course; where it is at the place already, it rests."""
         state, entry, heard_s = vehicle.state, vehicle.entry, vehicle.heard_ms / 1000
         assert state is not None
-        pose = Pose(state.x_m, state.y_m, state.heading_rad)
+        pose = pose_of(state)
         is_on_course = math.dist(errand.course.at(heard_s)[:2], pose[:2]) <= OFF_COURSE_M
         if is_on_course or heard_s < errand.course.start_s:  # or was heard before it was sent
             return errand.course
@@ -224,7 +224,7 @@ class Traffic:
         known = self._rests.get(entry.vehicle)
         if known is None or known[0] != vehicle.heard_ms:
             heard_s = vehicle.heard_ms / 1000
-            pose = Pose(state.x_m, state.y_m, state.heading_rad)
+            pose = pose_of(state)
             if entry.role.surveys and not entry.role.revisits:
                 laid = survey_course(entry, state, vehicle.plan, heard_s, self._keep_out, vehicle.flows)
             elif not (entry.role.surveys or vehicle.offers or entry.vehicle in self._errands):
@@ -267,7 +267,7 @@ def _is_off(vehicle: KnownVehicle, laid: Course) -> bool:
 
 def _left_of(passes: Sequence[Pass], state: AgentState) -> Sequence[Pass]:
     """Those from the one on that a vehicle is on; empty where it is on none."""
-    pose = Pose(state.x_m, state.y_m, state.heading_rad)
+    pose = pose_of(state)
     for place, one in enumerate(passes):
         if run_out_left_m(one.end, pose, one.length_m) > 0:
             return passes[place:]

@@ -15,6 +15,7 @@ from secondlook.recorded.metrics import Metrics
 from secondlook.recorded.observer import Watch
 from secondlook.scenario import Scenario, ScenarioError, make_scenario
 from secondlook.scenario.plug_ins import ALLOCATOR
+from secondlook.scenario.values import LONGEST_S
 
 NONE = "none"
 """The allocator without second looks."""
@@ -42,7 +43,7 @@ def _self_longer(scenario: Scenario, data: dict[str, Any]) -> None:
     longer, mission = equal_vehicle_seconds(scenario), scenario.mission
     if mission.deadline_s is None:
         data["mission"]["deadline_factor"] = longer
-        data["mission"]["time_limit_s"] = min(1e7, mission.time_limit_s * longer / mission.ends_s(1.0))
+        data["mission"]["time_limit_s"] = min(LONGEST_S, mission.time_limit_s * longer / mission.ends_s(1.0))
     else:
         data["mission"]["deadline_s"] = longer
         data["mission"]["time_limit_s"] = max(mission.time_limit_s, longer)
