@@ -90,7 +90,7 @@ class WallHost:
             expressions=[*seat.reads, "clock/beat/*", "clock/time", self._to_me],
             keeps=seat.keeps,
         )
-        self._post = WallPost(self._line, keys, routing, intake, seat.handled())
+        self._post = WallPost(self._line, keys, routing, intake, self._now, seat.handled())
         # Before the first hello: whoever the clock has heard of is missed when it ends, however soon that is.
         self._token = session.liveliness().declare_token(keys.life(host, self._instance))
 
@@ -230,6 +230,7 @@ class WallHost:
         self._gate.factor = told.factor
         self._time.hear(now_ms, told.factor, self._now())
         if first:
+            self._beat_at_s = 0.0  # of a node that was started anew a beat is overdue
             # Who was there before the start is the first of its name; later ones are told apart by when they came. The
             # wait for a clock that takes up a mission's time was no wait for the start.
             is_first = self._waits_for_start and not told.taken_up

@@ -92,7 +92,7 @@ class WallHub:
             keeps=[*seat.keeps, RUN.expression()],
             watches_lives=True,
         )
-        self._post = WallPost(self._line, keys, routing, intake)
+        self._post = WallPost(self._line, keys, routing, intake, self._now)
 
     def interrupt(self) -> None:
         """From another thread or a signal's handler: `run` raises Interrupted."""

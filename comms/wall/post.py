@@ -3,11 +3,13 @@ missing.
 
 Whatever a link loses that its sender keeps is noticed at the sender's next beat, and asked for. So a process that comes
 late, or had no link for a while, gets what it has missed, wherever that was lost. Until all has come nothing else of
-that sender is passed on; then everything is, in the order of sending.
+that sender is passed on; then everything is, in the order of sending. Where a beat is overdue the link may have been
+gone: what comes waits for the next beat, lest a track's end be heard of before its looks.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -26,6 +28,8 @@ from comms.words import unpack
 BEAT = f"{WORDS}beat/"
 MOST_WORDS_BYTES = 1 << 17  # some four times the beat of a world with a hundred vehicles
 MOST_HELD = 50_000  # messages of a sender, until all that it was asked for has come
+OVERDUE_AFTER_S = 0.8  # of wall time since a sender's last beat; there are two a second
+WAITS_FOR_BEAT_S = 1.0
 AHEAD_MS = 5000  # a message that is so far ahead of the receiver's time waits
 APART_S = 3.0  # of wall time: so long a stop one process may have noticed and another not, by which their times differ
 
@@ -42,18 +46,27 @@ Item = Received | Words | Life
 
 
 class WallPost:
-    """The post of the nodes of one process over its line. `intake`: opens what the line lets in. `heard`: what has come
-    to the nodes' predecessors and need not come again."""
+    """The post of the nodes of one process over its line. `intake`: opens what the line lets in. `now`: seconds by the
+    wall. `heard`: what has come to the nodes' predecessors and need not come again."""
 
     def __init__(
-        self, line: WallLine, keys: RunKeys, routing: Routing, intake: Intake, heard: HeardMessages | None = None
+        self,
+        line: WallLine,
+        keys: RunKeys,
+        routing: Routing,
+        intake: Intake,
+        now: Callable[[], float],
+        heard: HeardMessages | None = None,
     ) -> None:
         self.line = line
         self.intake = intake
         self._routing = routing
         self._keys = keys
+        self._now = now
         self._heard = HeardMessages() if heard is None else heard
         self._beats: dict[str, Beat] = {}
+        self._beat_due_s: dict[str, float] = {}  # when each sender's next beat is overdue
+        self._beat_by_s: dict[str, float] = {}  # of those whose beat is waited for: until when
         self._asked: dict[str, set[str]] = {}
         self._held: dict[str, list[Received]] = {}
         self._early: list[Received] = []
@@ -87,6 +100,10 @@ class WallPost:
         """Takes out what may be handled, in the order of arrival. What is ahead of our time, which runs faster than the
         wall by a factor, waits for it. It is dropped where it is farther ahead than any two processes' times are apart,
         or where its sender has said something since that is not ahead: then its time is false."""
+        now_s = self._now()
+        for sender in [sender for sender, by_s in self._beat_by_s.items() if now_s >= by_s]:
+            self._beat_is_here(sender, now_s)
+            self._early += self._released(sender)
         early, self._early = self._early, []
         found = [one for one in early if one.header.sent_ms - now_ms <= AHEAD_MS]
         if len(found) == len(early):
@@ -119,7 +136,7 @@ class WallPost:
     @property
     def is_complete(self) -> bool:
         """Whether all is here, and taken out, that those who have told what they keep have kept for us."""
-        return not self._early and not any(self._missing(sender) for sender in self._beats)
+        return not self._early and not self._held and not any(self._missing(sender) for sender in self._beats)
 
     @property
     def has_caught_up(self) -> bool:
@@ -135,7 +152,8 @@ class WallPost:
         if received is None:
             return []
         sender = received.header.sender
-        held = self._held.setdefault(sender, []) if sender in self._asked else None
+        waits = sender in self._asked or self._waits_for_beat(sender)
+        held = self._held.setdefault(sender, []) if waits else None
         if not self._heard.has_room(received) or (held is not None and len(held) >= MOST_HELD):
             self.intake.drop(FLOOD, sender, key)
             return []
@@ -152,7 +170,24 @@ class WallPost:
         if asked:
             return []
         del self._asked[sender]
-        return [*sorted(self._held.pop(sender, []), key=lambda one: one.header.order)]
+        return [*self._released(sender)]
+
+    def _waits_for_beat(self, sender: str) -> bool:
+        now_s = self._now()
+        if sender not in self._beat_by_s and now_s >= self._beat_due_s.get(sender, math.inf):
+            self._beat_by_s[sender] = now_s + WAITS_FOR_BEAT_S
+        return sender in self._beat_by_s
+
+    def _beat_is_here(self, sender: str, now_s: float) -> None:
+        """Or is not waited for any longer."""
+        self._beat_due_s[sender] = now_s + OVERDUE_AFTER_S
+        self._beat_by_s.pop(sender, None)
+
+    def _released(self, sender: str) -> list[Received]:
+        """What was held of a sender of whom nothing is waited for."""
+        if sender in self._asked or sender in self._beat_by_s:
+            return []
+        return sorted(self._held.pop(sender, []), key=lambda one: one.header.order)
 
     def _receive_words(self, key: str, payload: bytes) -> list[Item]:
         try:
@@ -166,12 +201,13 @@ class WallPost:
         except WordsError as error:
             self.intake.drop("senseless words", key, str(error))
             return []
+        self._beat_is_here(sender, self._now())
         for expression in self._missing(sender):
             asked = self._asked.setdefault(sender, set())
             if expression not in asked:
                 asked.add(expression)
                 self.line.ask(sender, expression, self._beats[sender].tallies[expression])
-        return []
+        return [*self._released(sender)]
 
     def _missing(self, sender: str) -> list[str]:
         beat = self._beats[sender]

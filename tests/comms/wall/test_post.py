@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any, cast
 
@@ -18,7 +18,7 @@ from comms.said.topics import CONTACT, STATE
 from comms.session import open_hub
 from comms.wall.gate import FLOOD, Gate
 from comms.wall.line import Answered, Asked, Event, Mail, WallLine
-from comms.wall.post import AHEAD_MS, WallPost, Words
+from comms.wall.post import AHEAD_MS, OVERDUE_AFTER_S, WAITS_FOR_BEAT_S, WallPost, Words
 from comms.wall.words import Beat, TimeSignal, pack_beat, pack_time
 from comms.words import pack
 
@@ -70,8 +70,18 @@ def mail(sent: Outgoing) -> Mail:
     return Mail(sent.key, sent.payload)
 
 
-def post_over(line: FakeLine) -> WallPost:
-    return WallPost(cast(WallLine, line), WALL_KEYS, ROUTING, Intake(ROUTING))
+@dataclass
+class Wall:
+    """The wall clock, which the test moves on."""
+
+    s: float = 100.0
+
+    def __call__(self) -> float:
+        return self.s
+
+
+def post_over(line: FakeLine, now: Callable[[], float] = lambda: 100.0) -> WallPost:
+    return WallPost(cast(WallLine, line), WALL_KEYS, ROUTING, Intake(ROUTING), now)
 
 
 def sequences(post: WallPost, *events: Event) -> list[int]:
@@ -97,6 +107,56 @@ def test_what_was_lost_comes_in_the_order_of_its_sending_and_nothing_before_it()
     assert sequences(post, alpha.beat()) == []
     assert post.is_complete
     assert len(line.asked) == 2
+
+
+def test_what_comes_after_a_link_was_gone_waits_for_the_beat_that_tells_what_was_lost() -> None:
+    """A track's end is not to be heard of before its looks."""
+    line, alpha, wall = FakeLine(), Alpha(), Wall()
+    post = post_over(line, wall)
+    assert sequences(post, alpha.beat()) == []
+    lost = alpha.say(contact(1))
+    wall.s += OVERDUE_AFTER_S - 0.01
+    assert sequences(post, mail(alpha.say(say_state("alpha", 1)))) == [1]
+    wall.s += 0.01
+    end = alpha.say(say_state("alpha", 2))
+    assert sequences(post, mail(end)) == []
+    assert not post.is_complete
+    wall.s += 0.1
+    assert sequences(post, alpha.beat()) == []
+    assert line.asked == [("alpha", CONTACTS, 1)]
+    assert sequences(post, mail(lost), Answered("alpha", CONTACTS, 1, 1)) == [0, 2]
+    assert post.is_complete
+    assert sequences(post, mail(alpha.say(say_state("alpha", 3)))) == [3]
+
+
+def test_a_late_beat_that_tells_of_nothing_missing_lets_go_what_waited_for_it() -> None:
+    line, alpha, wall = FakeLine(), Alpha(), Wall()
+    post = post_over(line, wall)
+    assert sequences(post, alpha.beat()) == []
+    wall.s += OVERDUE_AFTER_S
+    assert sequences(post, mail(alpha.say(contact(1))), mail(alpha.say(contact(2)))) == []
+    assert sequences(post, alpha.beat()) == [0, 1]
+    assert (line.asked, post.is_complete) == ([], True)
+    wall.s += OVERDUE_AFTER_S - 0.01
+    assert sequences(post, mail(alpha.say(contact(3)))) == [2]
+
+
+def test_a_beat_is_waited_for_a_second_at_most_and_not_before_there_was_one() -> None:
+    alpha, wall = Alpha(), Wall()
+    post = post_over(FakeLine(), wall)
+    wall.s += 10.0
+    assert sequences(post, mail(alpha.say(contact(1)))) == [0]
+    sequences(post, alpha.beat())
+    wall.s += OVERDUE_AFTER_S
+    assert sequences(post, mail(alpha.say(contact(2))), mail(alpha.say(contact(3)))) == []
+    wall.s += WAITS_FOR_BEAT_S - 0.01
+    assert post.in_time(1000, 1.0) == []
+    wall.s += 0.01
+    assert [one.header.sequence for one in post.in_time(1000, 1.0)] == [1, 2]
+    assert post.is_complete
+    assert sequences(post, mail(alpha.say(contact(4)))) == [3]  # who beats no more is not waited for each time
+    wall.s += OVERDUE_AFTER_S
+    assert sequences(post, mail(alpha.say(contact(5)))) == []
 
 
 def test_it_is_asked_once_at_a_time_and_again_if_no_answer_came() -> None:
@@ -143,7 +203,7 @@ def test_a_beat_with_a_tally_of_what_is_not_its_senders_to_keep_is_dropped_and_s
     with open_hub({"alpha": "secret"}, None)[0] as session:
         intake = Intake(ROUTING)
         line = WallLine(session, WALL_KEYS, Gate(ROUTING, intake), expressions=["agent/*/state", "clock/beat/*"])
-        post = WallPost(line, WALL_KEYS, ROUTING, intake)
+        post = WallPost(line, WALL_KEYS, ROUTING, intake, lambda: 100.0)
         for _ in range(3):
             assert post.receive(Mail("clock/beat/alpha", pack("beat", 0, {STATES: 1, key: 1})), list) == []
     assert post.intake.dropped == {"senseless words": 3}
