@@ -222,7 +222,7 @@ class Coordinator:
             return
         situation = self._briefing.situation(now_ms, sector)
         for helper in situation.free if len(self._sectors.all) > 1 else ():
-            better = self._sectors.better_for(helper, now_ms / 1000, situation.deadline_s)
+            better = self._sectors.better_for(helper, situation.now_s, situation.deadline_s)
             if better is not None:
                 self._sectors.join(helper.vehicle, better, now_ms)
                 log.info("%s joins the team of sector %d", helper.vehicle, better.number + 1)

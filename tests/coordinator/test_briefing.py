@@ -7,16 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from by_hand import HELPER, PRIMARY, run_info
+from by_hand import FLEET, HELPER, PRIMARY, run_info, vehicle
 from sectors_by_hand import sector, whole
 
-from comms.said.announcement import Vertex, Zone
+from comms.said.announcement import Role, Vertex, Zone
 from comms.said.codec import Header
 from comms.said.messages import AgentState, Mode, Plan, PlannedTrack, StripState
 from coordinator.allocate.service import Service
 from coordinator.allocate.simple import GreedyAllocator
 from coordinator.allocate.situation import Situation
-from coordinator.briefing import STAYS_MS, Briefing
+from coordinator.briefing import Briefing
 from coordinator.config import CoordinatorConfig
 from coordinator.cut.strips import Cut
 from coordinator.cut.window import Window
@@ -89,6 +89,26 @@ class TestTheTimeLeft:
         assert known.time_m(1_060_000) == 0.0
 
 
+def test_the_deadline_hangs_on_the_last_of_several_primaries_and_is_not_known_until_all_are() -> None:
+    fleet = KnownFleet(run_info(400, 400, vehicles=(*FLEET, vehicle("other", Role.SURVEY))), 30_000, 30_000, 0)
+    briefing = Briefing(replace(CONFIG, deadline_s=9000.0), Ledger(), fleet, 0.7)
+    plan = Plan(1, (PlannedTrack(1, 0, 0, 0, 0, 400, False),), (), (), "")
+    for name, end_ms, deadline_s in ((PRIMARY, 1_000_000, 9000.0), ("other", 2_000_000, 2100.0)):
+        fleet.vehicles[name].hear_survey(Header(name, 0, 1, 0), plan)
+        state = AgentState(Mode.SURVEY, 1, 1.0, end_ms, 122.5, 0, 0)
+        fleet.vehicles[name].hear_state(Header(name, 0, 1, 50_000), state, 50_000)
+        assert briefing.expected_deadline_s() == pytest.approx(deadline_s)
+
+
+def test_a_helper_s_battery_lasts_to_its_reserve_less_ten_seconds() -> None:
+    entry = replace(vehicle(HELPER, Role.REVISIT), endurance_ms=1_000_000, reserve_ms=100_000)
+    fleet = KnownFleet(run_info(400, 400, vehicles=(FLEET[0], entry)), 30_000, 30_000, 0)
+    state = AgentState(Mode.IDLE, 0, 0.5, 0, 122.5, 0, 0)
+    fleet.vehicles[HELPER].hear_state(Header(HELPER, 0, 1, 50_000), state, 50_000)
+    (helper,) = Briefing(CONFIG, Ledger(), fleet, 0.7).situation(60_000, whole(fleet)).helpers
+    assert helper.lasts_until_s == pytest.approx(50 + 500 - 100 - 10)
+
+
 def test_a_strip_is_told_with_the_risk_that_counts_on_it() -> None:
     known = Known()
     known.heard(HELPER, Mode.IDLE)
@@ -144,7 +164,7 @@ def at_work(known: Known) -> StripRecord:
 def test_who_was_sent_to_a_strip_is_not_turned_round_at_once() -> None:
     known = Known()
     at_work(known)  # since 50 s
-    for now_ms, stays in ((50_000, True), (50_000 + STAYS_MS - 1, True), (50_000 + STAYS_MS, False)):
+    for now_ms, stays in ((50_000, True), (59_999, True), (60_000, False)):
         assert known.situation(now_ms).helpers[0].sweeping == stays
 
 
@@ -160,6 +180,40 @@ def test_a_helper_that_is_free_soon_is_told_as_free_from_there_and_then_and_with
     (later,) = known.situation(140_000).helpers
     assert later.task is not None
     assert (later.task.strip.number, later.free_s, later.sweeping) == (2, 405.0, True)
+
+
+@pytest.mark.parametrize(
+    ("works_on", "end_ms", "free_s"), [(1, 300_000, 300), (1, 1, 150), (1, 0, 205), (0, 300_000, 205)]
+)
+def test_a_helper_is_free_when_it_says_if_that_is_of_its_strip_else_when_it_was_expected(
+    works_on: int, end_ms: int, free_s: float
+) -> None:
+    known = Known()
+    at_work(known)
+    state = AgentState(Mode.REVISIT, works_on, 1.0, end_ms, 122.5, 0, 0)
+    known.fleet.vehicles[HELPER].hear_state(Header(HELPER, 0, 2, 60_000), state, 60_000)
+    assert known.situation(150_000).helpers[0].free_s == free_s
+
+
+def test_ahead_of_its_end_is_within_a_millisecond_where_that_is_what_is_asked() -> None:
+    known = Known(replace(CONFIG, ahead_ms=1))
+    at_work(known)
+    assert [known.situation(now_ms).helpers[0].task is None for now_ms in (199_998, 199_999)] == [False, True]
+
+
+def test_who_has_not_answered_or_is_to_give_its_strip_back_is_offered_none_after_it() -> None:
+    known = Known(AHEAD)
+    at_work(known)
+    assert known.situation(150_000).helpers[0].task is None
+    known.fleet.vehicles[HELPER].asked_back = 1
+    assert known.situation(150_000).helpers[0].task is not None
+    known = Known(AHEAD)
+    at_work(known)
+    record = known.ledger.strip_of(HELPER)
+    assert record is not None
+    known.ledger.move(record, StripState.OPEN, 60_000, "")
+    known.ledger.move(record, StripState.OFFERED, 60_000, "", HELPER)
+    assert known.situation(150_000).helpers[0].task is not None
 
 
 def test_who_has_failed_too_often_or_is_on_its_way_home_is_not_told_of_even_where_it_has_a_strip_still() -> None:

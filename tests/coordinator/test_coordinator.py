@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -24,7 +25,7 @@ from coordinator_by_hand import (
 )
 from one_node import OneNode, received
 
-from comms.said.announcement import Role
+from comms.said.announcement import Role, RosterVehicle
 from comms.said.messages import (
     AgentState,
     CoverageTile,
@@ -68,7 +69,10 @@ class TestFromHotspotToTask:
         found = sorted((one.start_x_m, one.start_y_m, one.length_m, one.vehicle) for one in told.strips().values())
         assert found == [(122.5, 50, 300, HELPER), (327.5, 50, 300, SECOND_HELPER)]
 
-    def test_of_two_sectors_a_helper_that_finds_nothing_in_its_own_serves_the_other(self) -> None:
+    def test_of_two_sectors_a_helper_that_finds_nothing_in_its_own_serves_the_other(
+        self, caplog: pytest.LogCaptureFixture
+    ) -> None:
+        caplog.set_level("INFO", "secondlook.coordinator")
         told = coordinator(TWO_HELPERS, helpers_a_team=1)
         told.hotspot(HOT)
         told.hotspot((17.5, 50.0, 67.5, 350.0), number=2)
@@ -76,6 +80,22 @@ class TestFromHotspotToTask:
         told.state(SECOND_HELPER, Mode.IDLE)
         told.node.wait(1)
         assert [name for name, _, _ in told.tasks()] == [HELPER, SECOND_HELPER]
+        assert [one.message for one in caplog.records] == [f"{SECOND_HELPER} joins the team of sector 1"]
+
+    def test_of_two_sectors_one_is_decided_on_at_a_time(self) -> None:
+        told = coordinator(TWO_HELPERS, idle=(), helpers_a_team=1)
+        for number, place in enumerate((HOT, ELSEWHERE), 1):
+            told.hotspot(place, number=number)
+        told.node.wait(1)
+        assert told.states() == {1: OPEN, 2: OPEN}
+        for name in (HELPER, SECOND_HELPER):
+            told.state(name, Mode.IDLE)
+        node = told.node.node
+        assert isinstance(node, Coordinator)
+        for sectors in ([0, 1], [1], []):
+            assert node._agenda.sectors(Item.ASSIGN) == sectors
+            assert len(told.tasks()) == 2 - len(sectors)
+            told.settle()
 
     @pytest.mark.parametrize(("far_m", "sectors"), [(25.0, 2), (25.2, 1)])
     def test_no_sector_is_narrower_than_four_swaths(self, far_m: float, sectors: int) -> None:
@@ -84,6 +104,16 @@ class TestFromHotspotToTask:
         node = coordinator((FLEET[0], *helpers), helpers_a_team=1).node.node
         assert isinstance(node, Coordinator)
         assert len(node._sectors.all) == sectors
+
+    def test_strips_are_as_wide_and_sectors_as_large_as_for_the_helper_that_sees_least_far(self) -> None:
+        # Swaths of 50 m and 80 m; for four of the latter the area is not wide enough.
+        told = coordinator((*FLEET, replace(TWO_HELPERS[2], far_m=40.0)), helpers_a_team=1)
+        node = told.node.node
+        assert isinstance(node, Coordinator)
+        assert len(node._sectors.all) == 2
+        told.hotspot()
+        told.node.wait(1)
+        assert told.strips()[1].width_m == 50
 
     def test_where_tiles_have_come_the_map_counts(self) -> None:
         told = coordinator()
@@ -132,11 +162,12 @@ class TestFromHotspotToTask:
         told.keep_alive([PRIMARY, HELPER], 1)
         assert told.states() == {1: UNDER_WAY, 2: OPEN}
 
+    @pytest.mark.parametrize("vehicles", [FLEET, TWO_HELPERS], ids=["alone", "beside one that was never heard"])
     @pytest.mark.parametrize(("state", "within_ms"), [(TaskState.ACCEPTED, 10_000), (TaskState.UNDER_WAY, 120_000)])
     def test_news_is_cut_by_soon_where_one_on_its_way_may_be_turned_round(
-        self, state: TaskState, within_ms: int
+        self, state: TaskState, within_ms: int, vehicles: tuple[RosterVehicle, ...]
     ) -> None:
-        told = with_a_helper(state)
+        told = with_a_helper(state, vehicles)
         told.hotspot(ELSEWHERE, number=2)
         heard_ms = told.node.now_ms
         told.keep_alive([PRIMARY, HELPER], within_ms / 1000 - 1)
@@ -194,6 +225,25 @@ class TestFromHotspotToTask:
         told.state(HELPER, Mode.REVISIT, 1, at_ms=20_000, ends_ms=ends_ms)
         assert told.node.node._agenda.deadline_ms(Item.CUT) == cut_ms  # type: ignore[attr-defined]
 
+    def test_a_tile_that_is_no_news_is_not_cut_by(self) -> None:
+        told = coordinator()
+        tile = next(iter(tiles(GRID)))
+        levels = np.ones(GRID.shape, dtype=np.uint8)[tile.window]
+        message = CoverageTile(1, tile.first_row, tile.first_column, levels, levels, levels > 0)
+        node = told.node.node
+        assert isinstance(node, Coordinator)
+        for sectors in ([0], []):
+            told.node.hear(f"agent/{PRIMARY}/coverage/{tile.name}", message)
+            assert node._agenda.strike(Item.CUT, told.node.now_ms + 120_000) == sectors
+
+    def test_it_is_woken_anew_when_a_vehicle_would_be_silent_after_its_newest_state(self) -> None:
+        told = coordinator()
+        assert told.node.wake_ms == 30_000
+        told.node.wait_until(20_000)
+        for name, mode, wake_ms in ((PRIMARY, Mode.SURVEY, 30_000), (HELPER, Mode.IDLE, 49_999)):
+            told.state(name, mode, int(mode is Mode.SURVEY))
+            assert told.node.wake_ms == wake_ms
+
     def test_a_tile_s_window_is_that_of_its_cells(self) -> None:
         levels = np.ones((7, 5), dtype=np.uint8)
         assert _tile(CoverageTile(1, 40, 60, levels, levels, levels > 0)) == Window(40, 47, 60, 65)
@@ -247,8 +297,9 @@ class TestFromHotspotToTask:
         told.settle()
         assert told.states() == {1: OPEN}
 
-    def test_without_a_helper_there_are_no_strips(self) -> None:
-        told = coordinator(FLEET[:1], idle=())
+    @pytest.mark.parametrize("strips", ["reacting", "beforehand", "lanes"])
+    def test_without_a_helper_there_are_no_strips(self, strips: Literal["reacting", "beforehand", "lanes"]) -> None:
+        told = coordinator(FLEET[:1], idle=(), strips=strips)
         told.hotspot()
         told.settle()
         assert told.strips() == {}

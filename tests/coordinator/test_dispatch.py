@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 from by_hand import HELPER, PRIMARY, SECOND_HELPER
-from coordinator_by_hand import OPEN, TWO_HELPERS, Told, coordinator, with_a_helper
+from coordinator_by_hand import OFFERED, OPEN, TWO_HELPERS, Told, coordinator, with_a_helper
 from one_node import Said
 
 from comms.said.messages import AgentState, Mode, Task, TaskAction, TaskState
@@ -38,6 +38,31 @@ def test_whoever_is_heard_when_a_check_is_due_or_later_has_it_made() -> None:
     for now_ms, due_ms in ((89_999, None), (90_000, 90_000)):
         dispatch.note_state(HELPER, now_ms, does_another=False)
         assert node._agenda.deadline_ms(Item.KEEP_APART) == due_ms
+
+
+def test_who_does_another_thing_than_before_or_refuses_a_strip_is_looked_at_anew() -> None:
+    told = coordinator(separation_m=15.0)
+    node = told.node.node
+    assert isinstance(node, Coordinator)
+    right = node._dispatch._right_of_way
+    assert right is not None
+    told.hotspot()
+    told.settle()
+    assert told.states() == {1: OFFERED}
+
+    def has_changed() -> bool:
+        changed = right.check_s == 0.0
+        right.check_s = 1e6
+        return changed
+
+    has_changed()
+    told.status(HELPER, 1, TaskState.ACCEPTED)
+    assert not has_changed()
+    for mode, changed in ((Mode.TRANSIT, True), (Mode.TRANSIT, False), (Mode.REVISIT, True)):
+        told.state(HELPER, mode, 1)
+        assert has_changed() is changed
+    told.status(HELPER, 1, TaskState.REFUSED, "no rudder")
+    assert has_changed()
 
 
 def test_a_free_helper_in_the_way_of_a_primary_is_sent_to_a_place_beside_that_in_the_area() -> None:

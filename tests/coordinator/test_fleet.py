@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import logging
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from by_hand import HELPER, PRIMARY, run_info
@@ -9,6 +12,7 @@ from one_node import received
 
 from comms.said.codec import Header
 from comms.said.messages import AgentState, CoverageTile, Mode
+from coordinator.cut.window import Window
 from coordinator.fleet import KnownFleet
 
 
@@ -34,3 +38,37 @@ def test_tiles_that_do_not_fit_are_told_of_once_for_each_vehicle(caplog: pytest.
         assert not fleet.hear_tile(received(f"agent/{name}/coverage/0-0", beyond), beyond)
     told = [one.getMessage() for one in caplog.records]
     assert [one.split(":")[0] for one in told] == [f"dropped a message from {name}" for name in (HELPER, PRIMARY)]
+
+
+def test_who_is_lost_or_given_up_is_told_since_when_once(caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level(logging.INFO)
+    fleet = KnownFleet(run_info(400, 400), 30_000, 90_000, 0)
+    primary, idle = fleet.vehicles[PRIMARY], AgentState(Mode.IDLE, 0, 1, 0, 0, 0, 0)
+    primary.hear_state(Header(PRIMARY, 0, 1, 10_000), idle, 10_000)
+    fleet.vehicles[HELPER].hear_state(Header(HELPER, 0, 1, 20_000), idle, 20_000)
+    assert fleet.find_lost(99_999) == []
+    assert fleet.find_lost(100_000) == [PRIMARY]
+    assert fleet.find_lost(110_000) == [HELPER]
+    assert fleet.find_lost(110_001) == []
+    primary.hear_state(Header(PRIMARY, 0, 2, 290_000), idle, 290_000)
+    assert fleet.find_lost(309_999) == fleet.find_lost(310_000) == []  # heard, but it does nothing
+    assert [one.getMessage() for one in caplog.records] == [
+        f"{PRIMARY} is lost: nothing heard of it since 10 s",
+        f"{HELPER} is lost: nothing heard of it since 20 s",
+        f"{PRIMARY} is given up: it has not stirred since 10 s",
+    ]
+
+
+def test_who_is_silent_for_ten_times_as_long_as_a_silent_vehicle_is_not_waited_for() -> None:
+    fleet = KnownFleet(run_info(400, 400), 30_000, 90_000, 0)
+    helper, told = fleet.vehicles[HELPER], AgentState(Mode.IDLE, 0, 1, 0, 0, 0, 0)
+    helper.hear_state(Header(HELPER, 0, 1, 20_000), replace(told, tiles_told=1), 20_000)
+    assert fleet.lacking(319_999) == [helper]
+    assert fleet.lacking(320_000) == []
+
+
+def test_who_has_told_of_no_ground_has_seen_nothing_of_a_window() -> None:
+    fleet = KnownFleet(run_info(400, 400), 30_000, 90_000, 0)
+    levels = fleet.levels(HELPER, Window(2, 5, 3, 10))
+    assert levels.shape == (3, 7)
+    assert not levels.any()
