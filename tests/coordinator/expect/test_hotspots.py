@@ -74,6 +74,9 @@ def test_of_many_starts_the_oldest_stay_as_they_are(hotspots: Hotspots) -> None:
     assert hotspots.hear(("p", 1), (1, 2), hotspot(ELSEWHERE, 0.8))
     assert hotspots.hear(("q", 1), (0, 1), hotspot(None))
     assert (drawn(hotspots) == told((HOT_CELLS, 0.5), (ELSEWHERE_CELLS, 0.8))).all()
+    assert hotspots.hear(("p", 1), (MOST_STARTS + 1, 1), hotspot(None))
+    assert not hotspots.hear(("p", 1), (1, 3), hotspot(None))
+    assert (drawn(hotspots) == told((HOT_CELLS, 0.5), (ELSEWHERE_CELLS, 0.8))).all()
 
 
 def test_one_that_is_withdrawn_holds_nothing(hotspots: Hotspots) -> None:
