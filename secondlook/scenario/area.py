@@ -100,8 +100,9 @@ class Area(Mapping):
     cell_m: Annotated[Bin, Field(validate_default=True)] = 5.0
     """Cell of the residual-risk map, at most the shorter side of the area; the map has at most 20 million cells."""
     priorities: Annotated[tuple[Priority, ...], Field(strict=False, max_length=20)] = ()
-    """Ground whose residual risk counts more in second looks, or less. Where several overlap the last one counts. What
-    is told of the risk that is left stays as it is; recording and report show where it lies."""
+    """Ground whose residual risk counts more in second looks, or less. Where several overlap the last one counts, and
+    each must have ground that no later one covers. What is told of the risk that is left stays as it is; recording and
+    report show where it lies."""
 
     @property
     def extent_m(self) -> tuple[float, float]:
@@ -157,6 +158,11 @@ class Area(Mapping):
             area = _surveyed(info.data, info.data["keep_out_m"])
             if any(area.intersection(Polygon(one.polygon_m)).area < TOLERANCE for one in priorities):
                 raise refused("must each share ground with what is surveyed")
+            # They are told of by their number, so that none may be left out.
+            for number, one in enumerate(priorities, start=1):
+                later = union_all([Polygon(other.polygon_m) for other in priorities[number:]])
+                if area.intersection(Polygon(one.polygon_m)).difference(later).area < TOLERANCE:
+                    raise refused(f"must each have ground that no later one covers, priority {number} has none")
         return priorities
 
     @field_validator("cell_m")
