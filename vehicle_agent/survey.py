@@ -119,6 +119,8 @@ class SurveyAgent(Agent):
             free_ms = status.ends_ms + self.endurance.run_out_ms(one, self.config.run_in_m)
             if self.config.homing is not None and not self.endurance.lasts_from(one.end, free_ms):
                 self.turn_home(now_ms)
+            elif not self.flown:
+                self._tell_how_many_tracks_it_lasts_for()
         elif status.state is ManeuverState.ON_TRACK:
             self.mode = Mode.SURVEY
             self.report_state(now_ms)
@@ -281,6 +283,13 @@ class SurveyAgent(Agent):
         if not unseen.any():
             return "the survey ends, all of the area is seen"
         return f"the survey ends, {unseen.sum() / self._inside.sum():.2%} of the area is not seen"
+
+    def _tell_how_many_tracks_it_lasts_for(self) -> None:
+        """The first plan was told before the vehicle had said where it is."""
+        ahead = [*self.ahead, *self.later]
+        count = len(self._lasting(ahead))
+        if 0 < count < len(ahead):  # the first one lasts: the vehicle has said when it ends
+            self._publish_plan(f"the battery lasts for {count} of {len(ahead)} tracks")
 
     def _publish_plan(self, note: str) -> None:
         self._plan_revision += 1

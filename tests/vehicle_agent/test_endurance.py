@@ -156,6 +156,23 @@ def test_tracks_for_which_the_battery_does_not_last_are_not_among_those_that_may
     assert (len(plan.tracks), plan.tentative) == (count, tentative)
 
 
+@pytest.mark.parametrize(
+    ("endurance_ms", "count", "tentative"), [(3_600_000, 7, 5), (1_000_000, 3, 1), (700_000, 2, 0), (200_000, 7, 5)]
+)
+def test_once_it_knows_where_it_is_its_first_plan_holds_the_tracks_for_which_its_battery_lasts(
+    endurance_ms: int, count: int, tentative: int
+) -> None:
+    """As above. In 200 s it cannot fly the first one either, but the vehicle says so."""
+    node = survey(endurance_ms, run=run_info(1212, 200))
+    assert (len(node.last(Plan).tracks), node.last(Plan).tentative) == (7, 5)
+    node.hear(f"veh/{PRIMARY}/nav", nav())
+    node.hear(f"veh/{PRIMARY}/maneuver_status", ManeuverStatus(1, ManeuverState.ACCEPTED, 20_000, ""))
+    plan = node.last(Plan)
+    assert (len(plan.tracks), plan.tentative) == (count, tentative)
+    assert plan.note == (f"the battery lasts for {count} of 7 tracks" if count < 7 else node.all(Plan)[0].note)
+    assert node.last(Maneuver).number == 1
+
+
 def test_who_is_on_its_way_home_goes_on_when_the_mission_is_over() -> None:
     node = survey(150_000)
     node.hear(f"veh/{PRIMARY}/nav", Nav(0, 0, 0, 2, 15, 0))
