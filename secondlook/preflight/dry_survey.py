@@ -96,8 +96,8 @@ class _DryFlight:
         """From the run's announcement to where the survey ends, or the vehicle is home or empty."""
         agent, ends_s, back_s = self._agent, list[float](), 0.0
         agent.start(0)
+        self._hear(RUN, self._run)  # first, as in the mission: the agent sets out before it knows where it is
         self._hear(NAV, self._vehicle.nav(0))
-        self._hear(RUN, self._run)
         while not agent.mode.has_ended and self._tracks() <= MOST_TRACKS:
             if self._told is not None:
                 maneuver, self._told = self._told, None

@@ -184,8 +184,20 @@ class TestBatteries:
         assert two_tracks(**{"vehicles.primary.endurance_s": math.ceil(survey.needs_s) + 1}).refusals == ()
         assert two_tracks(**{"vehicles.primary.endurance_s": math.floor(survey.needs_s) - 1}).refusals != ()
 
-    def test_home_with_what_is_left_as_it_is_flown(self, tmp_path: Path) -> None:
-        settings = ["vehicles.primary.endurance_s=80"]
+    @pytest.mark.parametrize(
+        "settings",
+        [
+            ["vehicles.primary.endurance_s=80"],
+            # To and fro, an agent reckons with the slower way; the vehicle tells when the first track ends, on which it
+            # has set out before it knew where it was.
+            [
+                *("vehicles.primary.endurance_s=72", "vehicles.primary.reserve_s=0"),
+                "current={set_deg: 90, drift_mps: 4, period_s: 600}",
+            ],
+        ],
+        ids=["still water", "tide"],
+    )
+    def test_home_with_what_is_left_as_it_is_flown(self, settings: list[str], tmp_path: Path) -> None:
         expected = check_mission(BRIEF, settings)
         flown = fly(load_scenario(BRIEF, settings), tmp_path)
         told = flown.summary["vehicles"]["primary"]
