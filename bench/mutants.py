@@ -22,6 +22,8 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
+import time
 from collections.abc import Container, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
@@ -95,8 +97,21 @@ def files_here() -> list[str]:
     return [name for name in told if name and (ROOT / name).is_file()]
 
 
+def end_with_parent() -> None:
+    """Ends this process when the one that has started it is gone: a mutant may run for ever."""
+    parent = os.getppid()
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(0.5)  # of the end of a parent nobody tells
+        os.kill(os.getpid(), signal.SIGKILL)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
 def set_up(numbers: Any) -> None:
     """A copy of what is here, changed or not, and this process within it."""
+    end_with_parent()
     copy = HOME / f"copy-{numbers.get()}"
     shutil.rmtree(copy, ignore_errors=True)
     for name in files_here():
@@ -151,6 +166,7 @@ def said_of(tests: Sequence[str], limit_s: float) -> str:
 def run_tests(tests: Sequence[str]) -> None:
     """Ends this process, with 0 if they pass. They import the copy's modules and none of the folder itself."""
     os.setsid()
+    end_with_parent()
     rooms = {path.name for path in ROOT.iterdir()}
     for name in [name for name in sys.modules if name.split(".")[0] in rooms]:
         del sys.modules[name]

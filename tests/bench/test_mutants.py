@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -110,3 +112,23 @@ def test_each_judged_line_is_still_there_and_judged_once_with_a_reason() -> None
 
 def test_lines_are_compared_without_what_surrounds_them() -> None:
     assert changed(DIFF) == ("return x / 2", "return x * 2")
+
+
+def test_a_mutant_that_runs_for_ever_ends_with_the_process_that_tries_it() -> None:
+    """However that ends. The mutant has the test's end of the pipe, which is closed when both are gone."""
+    tries = """
+import os
+from bench.mutants import end_with_parent
+
+if os.fork() == 0:
+    end_with_parent()
+    os.write(1, b"at work")
+    while True:
+        pass
+os.wait()
+"""
+    with subprocess.Popen([sys.executable, "-c", tries], cwd=ROOT, stdout=subprocess.PIPE) as trying:
+        assert trying.stdout is not None
+        assert trying.stdout.read(len("at work")) == b"at work"
+        trying.kill()
+        assert trying.communicate(timeout=30)[0] == b""
