@@ -102,7 +102,7 @@ class WallPost:
         or where its sender has said something since that is not ahead: then its time is false."""
         now_s = self._now()
         for sender in [sender for sender, by_s in self._beat_by_s.items() if now_s >= by_s]:
-            self._beat_is_here(sender, now_s)
+            self._expect_next_beat(sender, now_s)
             self._early += self._released(sender)
         early, self._early = self._early, []
         found = [one for one in early if one.header.sent_ms - now_ms <= AHEAD_MS]
@@ -178,8 +178,8 @@ class WallPost:
             self._beat_by_s[sender] = now_s + WAITS_FOR_BEAT_S
         return sender in self._beat_by_s
 
-    def _beat_is_here(self, sender: str, now_s: float) -> None:
-        """Or is not waited for any longer."""
+    def _expect_next_beat(self, sender: str, now_s: float) -> None:
+        """A beat is here, or not waited for any longer."""
         self._beat_due_s[sender] = now_s + OVERDUE_AFTER_S
         self._beat_by_s.pop(sender, None)
 
@@ -201,7 +201,7 @@ class WallPost:
         except WordsError as error:
             self.intake.drop("senseless words", key, str(error))
             return []
-        self._beat_is_here(sender, self._now())
+        self._expect_next_beat(sender, self._now())
         for expression in self._missing(sender):
             asked = self._asked.setdefault(sender, set())
             if expression not in asked:

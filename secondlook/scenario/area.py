@@ -158,10 +158,8 @@ class Area(Mapping):
             area = _surveyed(info.data, info.data["keep_out_m"])
             if any(area.intersection(Polygon(one.polygon_m)).area < TOLERANCE for one in priorities):
                 raise refused("must each share ground with what is surveyed")
-            # They are told of by their number, so that none may be left out.
-            for number, one in enumerate(priorities, start=1):
-                later = union_all([Polygon(other.polygon_m) for other in priorities[number:]])
-                if area.intersection(Polygon(one.polygon_m)).difference(later).area < TOLERANCE:
+            for number, ground in enumerate(_uncovered(area, priorities), start=1):
+                if ground.area < TOLERANCE:  # they are told of by their number, so that none may be left out
                     raise refused(f"must each have ground that no later one covers, priority {number} has none")
         return priorities
 
@@ -195,17 +193,24 @@ def _extent_m(polygon_m: tuple[Point, ...], track_heading_deg: float | Literal["
     return float(np.ptp(across_m)), float(np.ptp(along_m))
 
 
+def _uncovered(area: BaseGeometry, priorities: Sequence[Priority]) -> list[BaseGeometry]:
+    """Of each priority what lies in an area and under no later one."""
+    found = []
+    for one in reversed(priorities):
+        outline = Polygon(one.polygon_m)
+        found.append(outline.intersection(area))
+        area = area.difference(outline)
+    return found[::-1]
+
+
 def priority_grounds(area: Polygon | MultiPolygon, priorities: Sequence[Priority]) -> list[PriorityGround]:
     """What counts more or less of an area: where several overlap the last one alone."""
     found: list[PriorityGround] = []
-    left: BaseGeometry = area
-    for one in reversed(priorities):
-        outline = Polygon(one.polygon_m)
+    for one, ground in zip(priorities, _uncovered(area, priorities), strict=True):
         # Where they only touch it is a line or a point.
-        parts = [part for part in get_parts(outline.intersection(left)) if isinstance(part, Polygon) and part.area]
+        parts = [part for part in get_parts(ground) if isinstance(part, Polygon) and part.area]
         if parts:
             rings = [ring for part in parts for ring in (part.exterior, *part.interiors)]
             outlines = tuple(tuple((x_m, y_m) for x_m, y_m in ring.coords[:-1]) for ring in rings)
             found.append(PriorityGround(outlines, one.weight))
-        left = left.difference(outline)
-    return found[::-1]
+    return found
