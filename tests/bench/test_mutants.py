@@ -118,10 +118,12 @@ def test_a_mutant_that_runs_for_ever_ends_with_the_process_that_tries_it() -> No
     """However that ends. The mutant has the test's end of the pipe, which is closed when both are gone."""
     tries = """
 import os
+import signal
 from bench.mutants import end_with_parent
 
 if os.fork() == 0:
     end_with_parent()
+    signal.alarm(60)  # whatever comes of this test
     os.write(1, b"at work")
     while True:
         pass

@@ -6,6 +6,7 @@ import queue
 import threading
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import count
 
 import pytest
 import zenoh
@@ -54,6 +55,15 @@ class Beta:
     def say(self, words: bytes) -> None:
         put(self.session, WALL_KEYS.to_host("beta"), words)
 
+    def comes_at(self, told: TimeSignal) -> None:
+        """It is welcome, and told the time and of the run."""
+        self.say(pack("welcome"))
+        while unpack(self.hears("clock/from/beta", "hello"))[4] is not True:
+            pass
+        put(self.session, WALL_KEYS.time, pack_time(told))
+        announced = Stamp(CLOCK, ROUTING)(RUN.key(), WALL_RUN, 0)
+        put(self.session, WALL_KEYS.topic(announced.key), announced.payload)
+
     def hears(self, key: str, first_word: str = "") -> bytes:
         """The next payload that comes under a key below the run id, and begins with this word."""
         while True:
@@ -86,12 +96,7 @@ def test_only_who_waited_for_a_mission_to_begin_is_the_first_of_its_name(
 ) -> None:
     if waits:
         put(beta.session, WALL_KEYS.time, pack_time(TimeSignal(None, 1.0)))
-    beta.say(pack("welcome"))
-    while unpack(beta.hears("clock/from/beta", "hello"))[4] is not True:
-        pass
-    put(beta.session, WALL_KEYS.time, pack_time(TimeSignal(5_000, 1.0, taken_up=taken_up)))
-    announced = Stamp(CLOCK, ROUTING)(RUN.key(), WALL_RUN, 0)
-    put(beta.session, WALL_KEYS.topic(announced.key), announced.payload)
+    beta.comes_at(TimeSignal(5_000, 1.0, taken_up=taken_up))
     assert header_of(beta.hears("agent/beta/state")).incarnation == incarnation
     beta.say(pack_finish(BusResult(Ending.OVER, 7_000, None, None, {}, {})))
     assert unpack(beta.hears("clock/from/beta", "done"))[2] == {"state": 1}
@@ -99,6 +104,13 @@ def test_only_who_waited_for_a_mission_to_begin_is_the_first_of_its_name(
     beta.thread.join(SOON_S)
     assert beta.result is not None
     assert (beta.result.ending, beta.result.mission_ms) == (Ending.OVER, 7_000)
+
+
+def test_who_comes_in_mid_mission_beats_first_lest_what_it_says_waits_for_that(beta: Beta) -> None:
+    beta.comes_at(TimeSignal(5_000, 1.0))
+    beat, state = WALL_KEYS.beat("beta"), WALL_KEYS.topic("agent/beta/state")
+    heard = (beta.heard.get(timeout=SOON_S)[0] for _ in count())
+    assert next(key for key in heard if key in (beat, state)) == beat
 
 
 def test_who_is_not_welcome_does_nothing_and_heeds_a_refusal_of_its_own_alone(beta: Beta) -> None:
