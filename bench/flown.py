@@ -26,8 +26,8 @@ Case = tuple[str, tuple[str, ...]]
 
 @dataclass(frozen=True)
 class Mission:
-    """One mission that a table rests on, to be flown again. `left`: what is kept of the risk that it left and of the
-    truth, by column of a sweep."""
+    """One mission that a table rests on, to be flown again. `left`: what is kept of what it left, by column of a
+    sweep."""
 
     scenario: str
     overrides: tuple[str, ...]
@@ -35,16 +35,23 @@ class Mission:
     left: Mapping[str, float]
 
 
-def risk_and_truth(row: Document) -> dict[str, float]:
-    """What a row tells of the risk that was left, and of the truth."""
-    return {name: value for name, value in row.items() if name.startswith(("risk", "priorities.", "truth."))}
+LEFT = (
+    *("risk", "priorities.", "truth.", "mines.", "goal.", "time.mission_s", "separation.", "vehicles."),
+    *("link.age.", "link.bytes_per_s"),
+)
+"""What names of a sweep's columns begin with that tell what a mission left, and is kept of one."""
+
+
+def figures_left(row: Document) -> dict[str, float]:
+    """What a row tells of what its mission left; flags as 0 and 1."""
+    return {name: value for name, value in row.items() if name.startswith(LEFT) and value is not None}
 
 
 def first_overridden(document: Document) -> Mission:
     """The first mission with an override, else the first."""
     rows = document["rows"]
     row = next((row for row in rows if row["overrides"]), rows[0])
-    return Mission(row["scenario"], tuple(row["overrides"]), row["seed"], risk_and_truth(row))
+    return Mission(row["scenario"], tuple(row["overrides"]), row["seed"], figures_left(row))
 
 
 @dataclass(frozen=True)
@@ -85,6 +92,6 @@ def all_rounded(document: Any) -> Any:
     return json.loads(json.dumps(document), parse_float=lambda text: round(float(text), DIGITS))
 
 
-def some(row: Document, names: Iterable[str]) -> Document:
+def some(row: Mapping[str, Any], names: Iterable[str]) -> Document:
     """Some of a row's figures, rounded."""
     return {name: round(row[name], DIGITS) if isinstance(row[name], float) else row[name] for name in names}

@@ -45,11 +45,11 @@ class _Watcher:
 @dataclass(frozen=True)
 class Met:
     """What came of a mission, or of several: of each target its predicted risk, and whether it was missed, both of
-    shape (targets,); the residual risk at the end of the first, mean and over the worst 30 %."""
+    shape (targets,); and of the first mission what it left, by column of a sweep."""
 
     risk: FloatArray
     missed: BoolArray
-    left: tuple[float, float]
+    left: Mapping[str, float]
 
     @cached_property
     def bins(self) -> list[Bin]:
@@ -80,7 +80,9 @@ def fly(scenario: str, overrides: Sequence[str], seed: int) -> Met:
     run_local(Routing(fleet.roster), nodes, {"observer": watcher}, fleet.run_info, fleet.time_limit_ms)
     left = watcher.metrics.risk()
     assert left is not None
-    return Met(*watcher.metrics.targets_met(), (left.mean, left.worst30_mean))
+    risk, missed = watcher.metrics.targets_met()
+    truth = {"truth.missed_share": float(missed.mean()), "truth.predicted_missed_share": float(risk.mean())}
+    return Met(risk, missed, {"risk.mean": left.mean, "risk.worst30_mean": left.worst30_mean, **truth})
 
 
 def fly_all(scenario: str, overrides: Sequence[str], missions: int, jobs: int = 2) -> Met:

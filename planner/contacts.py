@@ -12,20 +12,18 @@ which all this together is likeliest (found by expectation maximisation).
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable
-from dataclasses import dataclass
+from collections.abc import Hashable, Iterator, Mapping
+from dataclasses import dataclass, field
 from itertools import product
 
 import numpy as np
 
 from planner.fleet_map import FleetMap
+from planner.registration import MOST_APART_M, REACH_SIGMAS, Frame, registered
 from planner.types import BoolArray, FloatArray
 
-GATE_SIGMAS = 3.0
 LEAST_GATE_M = 2.0
 """What the sonar itself cannot tell apart."""
-MOST_GATE_M = 60.0
-"""Contacts farther apart are two objects, however little is known of where they are."""
 LEAST_SIGMA_M = 0.1
 PLACE_M = 20.0  # objects are looked up by squares of this side
 ROUNDS = 200
@@ -47,74 +45,146 @@ def likelihood_ratio(score: float) -> float:
     return mine / other if other > 0.0 else math.inf if mine > 0.0 else 0.0
 
 
-@dataclass
-class _Object:
-    """Where it is believed, with the standard deviation of that, of how many contacts, the logarithm of their
-    likelihood ratios' product, and whether it was seen from along the tracks and from across."""
+@dataclass(frozen=True, slots=True)
+class Sighting:
+    """A contact by `vehicle`: where it believes it, in the mission frame, with the standard deviation of its own place,
+    the recogniser's score in [0, 1], and whether it was seen from a strip across the tracks."""
 
+    vehicle: str
     x_m: float
     y_m: float
     sigma_m: float
+    score: float
+    across: bool = False
+
+    @property
+    def log_ratio(self) -> float:
+        """The logarithm of how much likelier the score is of a mine, -SURE to SURE."""
+        ratio = likelihood_ratio(self.score)
+        return math.copysign(SURE, ratio - 0.5) if ratio in (0.0, math.inf) else math.log(ratio)
+
+
+@dataclass(slots=True)
+class _Spot:
+    """Where one vehicle has an object by its own account: the means of its contacts of it."""
+
+    contacts: int
+    x_m: float
+    y_m: float
+    sigma_m: float
+
+    def join(self, sighting: Sighting) -> None:
+        self.contacts += 1
+        share = 1.0 / self.contacts
+        self.x_m += share * (sighting.x_m - self.x_m)
+        self.y_m += share * (sighting.y_m - self.y_m)
+        self.sigma_m += share * (sighting.sigma_m - self.sigma_m)
+
+
+@dataclass(slots=True)
+class _Object:
+    """Where it is believed, with the standard deviation of that and the weight of all its contacts, of how many, the
+    logarithm of their likelihood ratios' product, whether it was seen from along the tracks and from across, and where
+    each vehicle has it."""
+
+    x_m: float
+    y_m: float
+    sigma_m: float = 0.0
+    weight: float = 0.0
     contacts: int = 0
     log_ratio: float = 0.0
     along: bool = False
     across: bool = False
+    spots: dict[str, _Spot] = field(default_factory=dict)
+
+
+class _Joined:
+    """Objects by squares of PLACE_M, as contacts are joined to them one by one; vehicles' places lie in `frames`."""
+
+    def __init__(self, frames: Mapping[str, Frame]) -> None:
+        self.frames = frames
+        self._by_place: dict[tuple[int, int], list[_Object]] = {}
+        self._widest_m = 0.0
+
+    def __iter__(self) -> Iterator[_Object]:
+        """All of them, by place."""
+        return (one for place in sorted(self._by_place) for one in self._by_place[place])
+
+    def spots(self, vehicle: str) -> FloatArray:
+        """Where a vehicle has what it has seen, and to what standard deviation; shape (objects, 3)."""
+        of = [one.spots[vehicle] for one in self if vehicle in one.spots]
+        return np.array([(one.x_m, one.y_m, one.sigma_m) for one in of], dtype=np.float64).reshape(-1, 3)
+
+    def join(self, sighting: Sighting) -> None:
+        frame = self.frames[sighting.vehicle]
+        x_m, y_m = sighting.x_m - frame.east_m, sighting.y_m - frame.north_m
+        found = self._nearest(sighting, frame, x_m, y_m)
+        if found is None:
+            found = _Object(x_m, y_m)
+        else:
+            self._by_place[_place(found.x_m, found.y_m)].remove(found)
+        weight = 1.0 / max(frame.sigma_m, LEAST_SIGMA_M) ** 2
+        found.x_m = (found.weight * found.x_m + weight * x_m) / (found.weight + weight)
+        found.y_m = (found.weight * found.y_m + weight * y_m) / (found.weight + weight)
+        found.weight += weight
+        found.sigma_m = max(found.sigma_m, min(sighting.sigma_m, frame.placed_m))
+        found.contacts += 1
+        found.log_ratio += sighting.log_ratio
+        found.across |= sighting.across
+        found.along |= not sighting.across
+        found.spots.setdefault(sighting.vehicle, _Spot(0, 0.0, 0.0, 0.0)).join(sighting)
+        self._by_place.setdefault(_place(found.x_m, found.y_m), []).append(found)
+
+    def _nearest(self, sighting: Sighting, frame: Frame, x_m: float, y_m: float) -> _Object | None:
+        """The object that a contact is of, if it is known; in their frame the contact lies at (x_m, y_m)."""
+        self._widest_m = max(self._widest_m, sighting.sigma_m)
+        best, best_m = None, math.inf
+        reach = math.ceil(2.0 * _gate_m(math.hypot(self._widest_m, sighting.sigma_m)) / PLACE_M)
+        column, row = _place(x_m, y_m)
+        for place in product(range(column - reach, column + reach + 1), range(row - reach, row + reach + 1)):
+            for one in self._by_place.get(place, ()):
+                spot = one.spots.get(sighting.vehicle)
+                if spot is None:
+                    away_m = math.hypot(one.x_m - x_m, one.y_m - y_m)
+                    gate_m = _gate_m(math.hypot(frame.sigma_m, min(self.frames[name].sigma_m for name in one.spots)))
+                else:
+                    away_m = math.hypot(spot.x_m - sighting.x_m, spot.y_m - sighting.y_m)
+                    gate_m = _gate_m(sighting.sigma_m - spot.sigma_m)
+                if away_m <= gate_m and away_m < best_m:
+                    best, best_m = one, away_m
+        return best
 
 
 class Objects:
     """All objects that contacts have told of so far."""
 
     def __init__(self) -> None:
-        self._by_place: dict[tuple[int, int], list[_Object]] = {}
-        self._widest_m = 0.0
         self._heard: set[Hashable] = set()
+        self._sightings: list[Sighting] = []
+        self._alone: dict[str, _Joined] = {}
+        self._together = _Joined({})
+        self._joined = 0
 
-    def __len__(self) -> int:
-        return sum(len(some) for some in self._by_place.values())
-
-    def hear(
-        self, x_m: float, y_m: float, sigma_m: float, score: float, number: Hashable = None, *, across: bool = False
-    ) -> bool:
-        """Joins a contact: where it is believed, with the standard deviation of that, and its score in [0, 1].
-        `number`: what tells it from others; one that was heard before is not joined again, and False is returned.
-        `across`: it was seen from a strip across the tracks."""
+    def hear(self, sighting: Sighting, number: Hashable = None) -> bool:
+        """Joins a sighting. `number`: what tells it from others; one that was heard before is not joined again, and
+        False is returned."""
         if number is not None and number in self._heard:
             return False
         self._heard.add(number)
-        ratio = likelihood_ratio(score)
-        log_ratio = math.copysign(SURE, ratio - 0.5) if ratio in (0.0, math.inf) else math.log(ratio)
-        near = self._nearest(x_m, y_m, sigma_m)
-        if near is None:
-            near = _Object(x_m, y_m, sigma_m)
-        else:
-            self._by_place[_place(near.x_m, near.y_m)].remove(near)
-        weight, other = near.contacts / _variance(near.sigma_m), 1.0 / _variance(sigma_m)
-        near.x_m = (weight * near.x_m + other * x_m) / (weight + other)
-        near.y_m = (weight * near.y_m + other * y_m) / (weight + other)
-        near.sigma_m = max(near.sigma_m, sigma_m)
-        near.contacts += 1
-        near.log_ratio += log_ratio
-        near.across |= across
-        near.along |= not across
-        self._widest_m = max(self._widest_m, sigma_m)
-        self._by_place.setdefault(_place(near.x_m, near.y_m), []).append(near)
+        self._sightings.append(sighting)
+        name = sighting.vehicle
+        self._alone.setdefault(name, _Joined({name: Frame()})).join(sighting)
         return True
-
-    def _nearest(self, x_m: float, y_m: float, sigma_m: float) -> _Object | None:
-        """The object that a contact is of, if it is known."""
-        best, best_m = None, math.inf
-        reach = math.ceil(_gate_m(self._widest_m, sigma_m) / PLACE_M)
-        column, row = _place(x_m, y_m)
-        for place in product(range(column - reach, column + reach + 1), range(row - reach, row + reach + 1)):
-            for one in self._by_place.get(place, ()):
-                away_m = math.hypot(one.x_m - x_m, one.y_m - y_m)
-                if away_m <= _gate_m(one.sigma_m, sigma_m) and away_m < best_m:
-                    best, best_m = one, away_m
-        return best
 
     def seen(self) -> SeenObjects:
         """All of them, by place."""
-        some = [one for place in sorted(self._by_place) for one in self._by_place[place]]
+        frames = registered({name: joined.spots(name) for name, joined in self._alone.items()})
+        if frames != self._together.frames:  # what is known of how far they are off has changed: all are joined anew
+            self._together, self._joined = _Joined(frames), 0
+        for sighting in self._sightings[self._joined :]:
+            self._together.join(sighting)
+        self._joined = len(self._sightings)
+        some = list(self._together)
         return SeenObjects(
             x_m=np.array([one.x_m for one in some], dtype=np.float64),
             y_m=np.array([one.y_m for one in some], dtype=np.float64),
@@ -143,7 +213,7 @@ class SeenObjects:
     @property
     def gate_m(self) -> FloatArray:
         """Within which distance of where it is believed each lies, as good as certainly."""
-        return np.clip(GATE_SIGMAS * self.sigma_m, LEAST_GATE_M, MOST_GATE_M)
+        return np.clip(REACH_SIGMAS * self.sigma_m, LEAST_GATE_M, MOST_APART_M)
 
     def chances(self, nats: FloatArray) -> FloatArray:
         """With which chance each is a mine, clutter, nothing; shape (objects, 3). `nats`: what looks have seen at the
@@ -178,21 +248,16 @@ class ObjectsOnMap:
         self._heard = 0
         self._known: tuple[tuple[int, FleetMap | None, int], SeenObjects, FloatArray] | None = None
 
-    def __len__(self) -> int:
-        return len(self._objects)
-
-    def hear(
-        self, x_m: float, y_m: float, sigma_m: float, score: float, number: Hashable = None, *, across: bool = False
-    ) -> None:
+    def hear(self, sighting: Sighting, number: Hashable = None) -> None:
         """See `Objects.hear`."""
-        self._heard += self._objects.hear(x_m, y_m, sigma_m, score, number, across=across)
+        self._heard += self._objects.hear(sighting, number)
 
     def known(self) -> tuple[SeenObjects, FloatArray]:
         """All objects, and with which chance each is a mine, clutter, nothing; shape (objects, 3)."""
         as_of = self._heard, self.map, 0 if self.map is None else self.map.changes
         if self._known is None or self._known[0] != as_of:
             seen = self._objects.seen()
-            nats = np.zeros(len(self)) if self.map is None else self.map.nats_at(seen.x_m, seen.y_m)
+            nats = np.zeros(seen.x_m.shape) if self.map is None else self.map.nats_at(seen.x_m, seen.y_m)
             self._known = as_of, seen, seen.chances(nats)
         return self._known[1:]
 
@@ -246,9 +311,5 @@ def _place(x_m: float, y_m: float) -> tuple[int, int]:
     return math.floor(x_m / PLACE_M), math.floor(y_m / PLACE_M)
 
 
-def _gate_m(one_sigma_m: float, other_sigma_m: float) -> float:
-    return min(MOST_GATE_M, max(LEAST_GATE_M, GATE_SIGMAS * math.hypot(one_sigma_m, other_sigma_m)))
-
-
-def _variance(sigma_m: float) -> float:
-    return max(sigma_m, LEAST_SIGMA_M) ** 2
+def _gate_m(sigma_m: float) -> float:
+    return min(MOST_APART_M, max(LEAST_GATE_M, REACH_SIGMAS * abs(sigma_m)))

@@ -7,7 +7,7 @@ import rerun as rr
 from comms.node import Received
 from comms.said.messages import Contact, Curve
 from planner.clearance import mines_left_by, scatter_of_all
-from planner.contacts import ObjectsOnMap
+from planner.contacts import ObjectsOnMap, Sighting
 from planner.fleet_map import FleetMap
 from planner.types import BoolArray, DetectionCurve
 from viz import palette, paths
@@ -37,7 +37,8 @@ class Mines:
     def on_contact(self, received: Received, contact: Contact) -> None:
         """Joins a contact."""
         number = received.vehicle, received.header.incarnation, received.number
-        self._objects.hear(contact.x_m, contact.y_m, contact.sigma_m, contact.score, number)
+        place = contact.x_m, contact.y_m, contact.sigma_m
+        self._objects.hear(Sighting(received.vehicle, *place, contact.score), number)
 
     def on_curve(self, received: Received, curve: Curve) -> None:
         """Notes what a track has measured."""
@@ -55,7 +56,7 @@ class Mines:
         self._draw(time_ms)
 
     def _draw(self, time_ms: int) -> None:
-        if not len(self._objects):
+        if not self._objects.known()[0].x_m.size:
             return
         found = self._objects.mines
         scatter = scatter_of_all(list(one.values()) for one in self._curves.values())

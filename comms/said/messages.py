@@ -292,7 +292,8 @@ class CoverageTile:
 
 @dataclass(frozen=True, slots=True)
 class Contact:
-    """A detection: estimated position, its standard deviation, the recogniser's score, the look it comes from."""
+    """A detection: estimated position, the standard deviation of the vehicle's own, the recogniser's score, the look it
+    comes from."""
 
     x_m: PlaceX
     y_m: PlaceY

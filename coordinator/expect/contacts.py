@@ -17,7 +17,7 @@ from comms.said.messages import Contact
 from coordinator.cut.window import Window
 from coordinator.fleet import KnownFleet
 from planner.clearance import PRIOR_MINES
-from planner.contacts import ObjectsOnMap, surer_by
+from planner.contacts import ObjectsOnMap, Sighting, surer_by
 from planner.rounding import rounded
 from planner.types import BoolArray, FloatArray
 
@@ -36,7 +36,8 @@ class KnownContacts:
     def hear(self, received: Received, contact: Contact, *, across: bool) -> None:
         """Joins a contact. `across`: it was seen from a strip across the tracks."""
         number = received.vehicle, received.header.incarnation, received.number
-        self._objects.hear(contact.x_m, contact.y_m, contact.sigma_m, contact.score, number, across=across)
+        place = contact.x_m, contact.y_m, contact.sigma_m
+        self._objects.hear(Sighting(received.vehicle, *place, contact.score, across), number)
 
     @property
     def mines(self) -> float:

@@ -33,7 +33,7 @@ from comms.said.messages import (
 )
 from comms.strip_books import StripBooks
 from planner.clearance import PRIOR_MINES, MinesLeft, mines_left_by, scatter_of_all
-from planner.contacts import LISTED_FROM, ObjectsOnMap, SeenObjects
+from planner.contacts import LISTED_FROM, ObjectsOnMap, SeenObjects, Sighting
 from planner.fleet_map import FleetMap, VehicleLayer
 from planner.footprints import footprint_of
 from planner.footprints.footprint import Footprint
@@ -135,7 +135,8 @@ class Metrics:
             self._hear_tile(received, message)
         elif isinstance(message, Contact):
             number = received.vehicle, received.header.incarnation, received.number
-            self.objects.hear(message.x_m, message.y_m, message.sigma_m, message.score, number)
+            place = message.x_m, message.y_m, message.sigma_m
+            self.objects.hear(Sighting(received.vehicle, *place, message.score), number)
         elif isinstance(message, Curve) and message.track > 0 and message.detection_curve is not None:
             self.curves.setdefault(received.vehicle, {})[message.track] = message.detection_curve
         elif isinstance(message, Plan) and vehicle is not None:
@@ -350,9 +351,10 @@ class Metrics:
         left = self.mines_left()
         if left is None:
             return None
+        chances = self.mine_chances()[1]
         return {
-            "objects": len(self.objects),
-            "listed": int((self.mine_chances()[1] >= LISTED_FROM).sum()),
+            "objects": chances.size,
+            "listed": int((chances >= LISTED_FROM).sum()),
             "found": left.found,
             "left": left.mean,
             "left_low": left.low,

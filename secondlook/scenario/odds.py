@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from secondlook.scenario.model import Scenario
+from secondlook.scenario.model import Scenario, UniformSeabed
+from secondlook.scenario.sensor import SensorBase
 
 
 def at_odds(scenario: Scenario) -> str:
-    """In a sentence what of a scenario's world its map does not know; empty where it is right about all of it."""
-    told = [*_targets(scenario), *_estimates(scenario)]
-    return f"the map is wrong on purpose: {'; '.join(told)}" if told else ""
+    """In a sentence what of a scenario's world its fleet does not know; empty where it is right about all of it."""
+    told = [*_targets(scenario), *_estimates(scenario), *_places(scenario)]
+    return f"the fleet is wrong on purpose: {'; '.join(told)}" if told else ""
 
 
 def _targets(scenario: Scenario) -> Iterator[str]:
@@ -24,9 +25,26 @@ def _targets(scenario: Scenario) -> Iterator[str]:
         yield f"from other aspects looks share less, {targets.aspect_deg:g} degrees apart nothing"
     if targets.kinds is not None:
         yield f"targets are {targets.kinds}, and it takes them for alike"
+    if targets.layout is not None:
+        yield f"targets.layout is {targets.layout.kind}, and it takes them for spread at random"
 
 
 def _estimates(scenario: Scenario) -> Iterator[str]:
-    wrong = [name for name, one in scenario.vehicles.items() if one.sensor.estimate is not None]
+    wrong = [name for name, one in scenario.vehicles.items() if _errs(one.sensor, scenario)]
     if wrong:
         yield f"what it is told of P_d errs as sensor.estimate of {', '.join(wrong)} says"
+
+
+def _errs(sensor: SensorBase, scenario: Scenario) -> bool:
+    estimate = sensor.estimate
+    if estimate is None:
+        return False
+    drawn = estimate.drift_per_km or (estimate.noise_along_m is not None and sensor.noise_cell)
+    blind = estimate.blind_to_seabed and sensor.seabed_share != 0.0 and not isinstance(scenario.seabed, UniformSeabed)
+    return bool(estimate.bias or estimate.bias_at_reach or estimate.bias_after_turn or drawn or blind)
+
+
+def _places(scenario: Scenario) -> Iterator[str]:
+    off = [name for name, one in scenario.vehicles.items() if one.position_error_m or one.position_drift_m_per_h]
+    if off:
+        yield f"of {', '.join(off)} it takes positions for true that are off by up to what they tell"

@@ -10,74 +10,115 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from told_tile import whole_map
 
-from planner.contacts import LISTED_FROM, Objects, ObjectsOnMap, likelihood_ratio, surer_by
+from planner.contacts import LISTED_FROM, Objects, ObjectsOnMap, Sighting, likelihood_ratio, surer_by
 from planner.fleet_map import FleetMap
 from planner.risk import NATS_PER_LEVEL
 from planner.types import GridSpec, SweepFrame
 
 
+def count(objects: Objects) -> int:
+    """How many objects there are."""
+    return len(objects.seen().x_m)
+
+
 def test_a_contact_near_another_is_of_the_same_object_and_one_farther_off_is_not() -> None:
     objects = Objects()
-    objects.hear(100.0, 100.0, 0.0, 0.8)
-    objects.hear(102.0, 100.0, 0.0, 0.7)
-    assert len(objects) == 1
-    objects.hear(101.0, 102.1, 0.0, 0.7)
-    assert len(objects) == 2
+    objects.hear(Sighting("primary", 100.0, 100.0, 0.0, 0.8))
+    objects.hear(Sighting("primary", 102.0, 100.0, 0.0, 0.7))
+    assert count(objects) == 1
+    objects.hear(Sighting("primary", 101.0, 102.1, 0.0, 0.7))
+    assert count(objects) == 2
 
 
-def test_what_is_known_less_well_may_lie_farther_apart() -> None:
+def test_what_two_vehicles_know_less_well_may_lie_farther_apart() -> None:
     objects = Objects()
-    objects.hear(0.0, 0.0, 3.0, 0.8)
-    objects.hear(15.0, 0.0, 4.0, 0.8)  # 3 times 5 m
-    assert len(objects) == 1
-    objects.hear(60.0, 0.0, 4.0, 0.8)
-    assert len(objects) == 2
+    objects.hear(Sighting("helper", 0.0, 0.0, 3.0, 0.8))
+    objects.hear(Sighting("primary", 15.0, 0.0, 4.0, 0.8))  # 3 times 5 m
+    assert count(objects) == 1
+    objects.hear(Sighting("primary", 60.0, 0.0, 4.0, 0.8))
+    assert count(objects) == 2
     farther = Objects()
-    farther.hear(0.0, 0.0, 3.0, 0.8)
-    farther.hear(15.1, 0.0, 4.0, 0.8)
-    assert len(farther) == 2
+    farther.hear(Sighting("helper", 0.0, 0.0, 3.0, 0.8))
+    farther.hear(Sighting("primary", 15.4, 0.0, 4.0, 0.8))
+    assert count(farther) == 2
+
+
+def test_a_vehicle_is_off_by_as_much_as_it_was_but_for_its_drift() -> None:
+    for apart_m, later_sigma_m, found in ((2.0, 9.0, 1), (2.1, 9.0, 2), (5.9, 11.0, 1), (6.1, 11.0, 2), (5.9, 7.0, 1)):
+        objects = Objects()
+        objects.hear(Sighting("primary", 0.0, 0.0, 9.0, 0.8))
+        objects.hear(Sighting("primary", apart_m, 0.0, later_sigma_m, 0.8))
+        assert count(objects) == found, apart_m
+
+
+def test_what_one_vehicle_has_told_apart_another_does_not_join() -> None:
+    objects = Objects()
+    objects.hear(Sighting("helper", 0.0, 0.0, 0.0, 0.8))
+    for x_m in (-11.0, 11.0):  # both within 3 times 5 m
+        objects.hear(Sighting("primary", x_m, 0.0, 5.0, 0.8))
+    seen = objects.seen()
+    assert sorted(seen.contacts.tolist()) == [1.0, 2.0]
 
 
 def test_who_knows_nothing_of_its_place_joins_no_more_than_what_is_near() -> None:
     objects = Objects()
-    objects.hear(0.0, 0.0, 1e9, 0.8)
-    objects.hear(60.0, 0.0, 0.0, 0.8)  # which is as good as certain, and where the object lies from now on
-    assert len(objects) == 1
-    objects.hear(-0.5, 0.0, 1e9, 0.8)
-    assert len(objects) == 2
+    objects.hear(Sighting("primary", 0.0, 0.0, 1e9, 0.8))
+    objects.hear(Sighting("helper", 60.0, 0.0, 0.0, 0.8))
+    assert count(objects) == 1
+    assert objects.seen().x_m == pytest.approx([60.0])  # the helper is as good as certain
+    objects = Objects()
+    objects.hear(Sighting("primary", -0.1, 0.0, 1e9, 0.8))
+    objects.hear(Sighting("helper", 60.0, 0.0, 0.0, 0.8))
+    assert count(objects) == 2
 
 
 @pytest.mark.parametrize(("east_m", "north_m"), [(56.9, 0), (-56.9, 0), (0, 56.9), (0, -56.9), (40, -40), (-40, 40)])
 def test_an_object_is_found_from_wherever_it_is_within_reach(east_m: float, north_m: float) -> None:
-    objects = Objects()
-    objects.hear(10.0, -10.0, 19.0, 0.8)
-    objects.hear(10.0 + east_m, -10.0 + north_m, 0.0, 0.8)
-    assert len(objects) == 1
-    objects.hear(10.0 + 1.2 * east_m, -10.0 + 1.2 * north_m, 0.0, 0.8)  # the object has moved to where it is sure
-    objects.hear(10.0 - 0.1 * east_m, -10.0 - 0.1 * north_m, 0.0, 0.8)
-    assert len(objects) == 2
+    for times, found in ((1.0, 1), (1.1, 2)):
+        objects = Objects()
+        objects.hear(Sighting("primary", 10.0, -10.0, 0.0, 0.8))
+        objects.hear(Sighting("helper", 10.0 + times * east_m, -10.0 + times * north_m, 20.0, 0.8))
+        assert count(objects) == found
 
 
 def test_an_object_lies_at_the_mean_of_its_contacts_each_by_how_sure_it_is() -> None:
     objects = Objects()
-    objects.hear(0.0, 0.0, 2.0, 0.6)
-    objects.hear(3.0, -6.0, 1.0, 0.55)
+    for x_m, y_m, score in ((0.0, 0.0, 0.6), (1.2, -0.6, 0.55)):
+        objects.hear(Sighting("primary", x_m, y_m, 0.0, score))
     seen = objects.seen()
-    assert (seen.x_m.tolist(), seen.y_m.tolist()) == (pytest.approx([2.4]), pytest.approx([-4.8]))
-    objects.hear(2.4, -4.3, 0.05, 0.7)  # none is surer than to a decimetre
+    assert (seen.x_m.tolist(), seen.y_m.tolist()) == (pytest.approx([0.6]), pytest.approx([-0.3]))
+    objects.hear(Sighting("helper", 1.0, 0.5, 0.2, 0.7))  # to a decimetre and to two of them: as 4 to 1
     seen = objects.seen()
-    assert seen.y_m == pytest.approx([(-4.8 * 2 / 4.0 - 4.3 * 100.0) / (2 / 4.0 + 100.0)])
-    assert (seen.sigma_m.tolist(), seen.contacts.tolist()) == ([2.0], [3.0])
+    assert seen.x_m == pytest.approx([0.6 + 0.4 / 9], abs=0.02)
+    assert seen.y_m == pytest.approx([-0.3 + 0.8 / 9], abs=0.02)
+    assert (seen.sigma_m.tolist(), seen.contacts.tolist()) == ([0.2], [3.0])
     ratios = (12 * s * (1 - s) / (16 * o * (1 - o) ** 2) for s, o in ((0.2, 0.8), (0.1, 11 / 15), (0.4, 14 / 15)))
     assert seen.log_ratio == pytest.approx([sum(map(math.log, ratios))])
-    objects.hear(2.4, -4.3, 2.5, 0.7)
-    assert objects.seen().sigma_m.tolist() == [2.5]
+
+
+def test_contacts_of_vehicles_that_are_off_are_laid_over_each_other() -> None:
+    """Some 12 m apart, told up to 21 m off: what more than one has seen tells how far."""
+    rng = np.random.default_rng(3)
+    places = 12.0 * np.array([(row, column) for row in range(12) for column in range(12)], dtype=float)
+    places = (places + rng.uniform(-4.0, 4.0, places.shape))[rng.random(len(places)) < 0.6]
+    off_m = {"primary": (14.0, -15.0), "helper": (0.0, 9.9), "second": (-3.0, 0.0)}
+    objects, seen_by_any = Objects(), set()
+    for name, (east_m, north_m) in off_m.items():
+        for place in np.flatnonzero(rng.random(len(places)) < 0.6).tolist():
+            seen_by_any.add(place)
+            x_m, y_m = (places[place] + (east_m, north_m)).tolist()
+            objects.hear(Sighting(name, x_m, y_m, 20.0 if name == "primary" else 10.0, 0.8))
+    seen = objects.seen()
+    assert len(seen.x_m) == len(seen_by_any)
+    found = np.stack([seen.x_m, seen.y_m], axis=1) - off_m["helper"]  # who knows its place best, and first by its name
+    apart_m = np.hypot(*(found[:, np.newaxis] - places[sorted(seen_by_any)]).T)
+    assert apart_m.min(axis=0).max() < 0.1
 
 
 def test_of_two_just_as_near_a_contact_is_of_the_one_heard_of_first() -> None:
     objects = Objects()
     for x_m in (1.0, 5.0, 3.0):
-        objects.hear(x_m, 0.0, 0.5, 0.8)
+        objects.hear(Sighting("primary", x_m, 0.0, 0.5, 0.8))
     seen = objects.seen()
     assert dict(zip(seen.x_m.tolist(), seen.contacts.tolist(), strict=True)) == {2.0: 2.0, 5.0: 1.0}
 
@@ -85,7 +126,7 @@ def test_of_two_just_as_near_a_contact_is_of_the_one_heard_of_first() -> None:
 def test_objects_are_told_by_place_from_west_to_east_and_south_to_north() -> None:
     objects = Objects()
     for x_m, y_m in ((50.0, 0.0), (-50.0, 0.0), (-50.0, -40.0), (10.0, 90.0), (10.0, -90.0)):
-        objects.hear(x_m, y_m, 0.0, 0.8)
+        objects.hear(Sighting("primary", x_m, y_m, 0.0, 0.8))
     seen = objects.seen()
     assert list(zip(seen.x_m.tolist(), seen.y_m.tolist(), strict=True)) == [
         *((-50.0, -40.0), (-50.0, 0.0), (10.0, -90.0), (10.0, 90.0), (50.0, 0.0)),
@@ -96,7 +137,7 @@ def test_a_score_that_only_a_mine_has_or_none_is_as_good_as_sure() -> None:
     objects = Objects()
     for x_m, scores in ((0.0, [0.8]), (50.0, [0.3]), (100.0, [0.8, 0.8, 0.3])):
         for score in scores:
-            objects.hear(x_m, 0.0, 0.3, score)
+            objects.hear(Sighting("primary", x_m, 0.0, 0.3, score))
     seen = objects.seen()
     assert seen.log_ratio.tolist() == [50.0, -50.0, 50.0]
     assert seen.along.all()
@@ -106,17 +147,17 @@ def test_a_score_that_only_a_mine_has_or_none_is_as_good_as_sure() -> None:
 def test_an_object_lies_within_three_deviations_and_within_2_to_60_m() -> None:
     objects = Objects()
     for place, sigma_m in enumerate((0.1, 5.0, 30.0)):
-        objects.hear(200.0 * place, 0.0, sigma_m, 0.8)
+        objects.hear(Sighting("primary", 200.0 * place, 0.0, sigma_m, 0.8))
     assert objects.seen().gate_m.tolist() == [2.0, 15.0, 60.0]
 
 
-def test_the_nearest_is_taken_and_the_surer_place_counts_more() -> None:
+def test_the_nearest_is_taken() -> None:
     objects = Objects()
-    objects.hear(0.0, 0.0, 1.0, 0.8)
-    objects.hear(10.0, 0.0, 1.0, 0.8)
-    objects.hear(6.0, 0.0, 3.0, 0.8)  # within reach of both, nearer to the second
-    objects.hear(-4.0, 0.0, 1.0, 0.8)  # the first lies where it lay
-    assert len(objects) == 2
+    objects.hear(Sighting("primary", 0.0, 0.0, 0.0, 0.8))
+    objects.hear(Sighting("primary", 10.0, 0.0, 0.0, 0.8))
+    objects.hear(Sighting("helper", 6.0, 0.0, 3.0, 0.8))  # within reach of both, nearer to the second
+    seen = objects.seen()
+    assert dict(zip(seen.x_m.round().tolist(), seen.contacts.tolist(), strict=True)) == {0.0: 1.0, 10.0: 2.0}
 
 
 @given(
@@ -130,8 +171,8 @@ def test_places_well_apart_are_as_many_objects_however_often_they_are_seen(
     order.shuffle(seen)  # type: ignore[attr-defined]
     objects = Objects()
     for x, y in seen:
-        objects.hear(5.0 * x, 5.0 * y, 0.3, 0.9)
-    assert len(objects) == len(places)
+        objects.hear(Sighting("primary", 5.0 * x, 5.0 * y, 0.3, 0.9))
+    assert count(objects) == len(places)
 
 
 def test_a_ratio_is_that_of_the_densities_of_mines_and_of_false_alarms() -> None:
@@ -149,17 +190,17 @@ def test_a_ratio_is_that_of_the_densities_of_mines_and_of_false_alarms() -> None
 
 def test_what_was_heard_before_is_not_heard_again() -> None:
     objects = Objects()
-    assert objects.hear(0.0, 0.0, 1.0, 0.8, ("primary", 1))
-    assert not objects.hear(0.0, 0.0, 1.0, 0.8, ("primary", 1))
-    assert objects.hear(0.0, 0.0, 1.0, 0.8, ("helper", 1))
+    assert objects.hear(Sighting("primary", 0.0, 0.0, 1.0, 0.8), ("primary", 1))
+    assert not objects.hear(Sighting("primary", 0.0, 0.0, 1.0, 0.8), ("primary", 1))
+    assert objects.hear(Sighting("helper", 0.0, 0.0, 1.0, 0.8), ("helper", 1))
     assert objects.seen().contacts.tolist() == [2.0]
 
 
 def test_it_is_told_from_where_an_object_was_seen() -> None:
     objects = Objects()
-    objects.hear(0.0, 0.0, 1.0, 0.8)
-    objects.hear(100.0, 0.0, 1.0, 0.8, across=True)
-    objects.hear(0.5, 0.0, 1.0, 0.8, across=True)
+    objects.hear(Sighting("primary", 0.0, 0.0, 1.0, 0.8))
+    objects.hear(Sighting("primary", 100.0, 0.0, 1.0, 0.8, across=True))
+    objects.hear(Sighting("primary", 0.5, 0.0, 1.0, 0.8, across=True))
     seen = objects.seen()
     assert dict(zip(seen.x_m.tolist(), zip(seen.along.tolist(), seen.across.tolist(), strict=True), strict=True)) == {
         0.25: (True, True),
@@ -179,7 +220,7 @@ def test_as_many_are_expected_to_be_mines_as_are(mines: int, clutter: int, alarm
         found += is_mine and often > 0
         for _ in range(often):
             score = 0.5 + 0.5 * rng.beta(2, 2) if is_mine else 0.75 * rng.beta(2, 3)
-            objects.hear(10.0 * place, 0.0, 0.0, float(score))
+            objects.hear(Sighting("primary", 10.0 * place, 0.0, 0.0, float(score)))
     seen = objects.seen()
     chances = seen.chances(np.full(seen.x_m.shape, 1.2))
     assert chances.sum(axis=1) == pytest.approx(1.0)
@@ -189,9 +230,9 @@ def test_as_many_are_expected_to_be_mines_as_are(mines: int, clutter: int, alarm
 def test_who_is_looked_at_and_not_seen_again_is_less_likely_to_lie_there() -> None:
     objects = Objects()
     for place in range(60):
-        objects.hear(10.0 * place, 0.0, 0.0, 0.6)
+        objects.hear(Sighting("primary", 10.0 * place, 0.0, 0.0, 0.6))
         if place % 6 == 0:
-            objects.hear(10.0 * place, 0.0, 0.0, 0.6)
+            objects.hear(Sighting("primary", 10.0 * place, 0.0, 0.0, 0.6))
     seen = objects.seen()
     once = seen.contacts == 1
     poorly, well = seen.chances(np.full(60, 0.3)), seen.chances(np.where(once, 3.0, 0.3))
@@ -201,11 +242,11 @@ def test_who_is_looked_at_and_not_seen_again_is_less_likely_to_lie_there() -> No
 
 def test_what_objects_are_is_worked_out_once_until_there_is_news() -> None:
     objects = ObjectsOnMap()
-    objects.hear(0.0, 0.0, 0.0, 0.6)
+    objects.hear(Sighting("primary", 0.0, 0.0, 0.0, 0.6))
     seen, chances = objects.known()
     assert chances.tolist() == seen.chances(np.zeros(1)).tolist()
     assert objects.known()[1] is chances
-    objects.hear(50.0, 0.0, 0.0, 0.7)
+    objects.hear(Sighting("primary", 50.0, 0.0, 0.0, 0.7))
     seen, chances = objects.known()
     assert seen.x_m.tolist() == [0.0, 50.0]
     assert (seen.along.tolist(), seen.across.tolist()) == ([True, True], [False, False])
@@ -216,7 +257,7 @@ def test_an_alarm_is_raised_again_once_in_a_thousand_times() -> None:
     objects = Objects()
     for place, often in enumerate((1, 1, 1, 2, 2)):
         for _ in range(often):
-            objects.hear(10.0 * place, 0.0, 0.0, 0.6)
+            objects.hear(Sighting("primary", 10.0 * place, 0.0, 0.0, 0.6))
     chances = objects.seen().chances(np.full(5, 0.4))
     # Who lies there is seen twice, and not once, 0.4 / 2 times as often.
     alarms_to_clutter = chances[:, 2] / chances[:, 1]
@@ -235,7 +276,7 @@ def test_chances_are_those_under_which_what_was_heard_is_likeliest(heard: list[l
     objects, likely = Objects(), []
     for place, (scores, seen_nats) in enumerate(zip(heard, nats, strict=False)):
         for score in scores:
-            objects.hear(50.0 * place, 0.0, 0.0, score)
+            objects.hear(Sighting("primary", 50.0 * place, 0.0, 0.0, score))
         often, mean = len(scores), max(seen_nats, 1e-3)
         seen_so_often = mean**often * math.exp(-mean) / math.factorial(often) / (1.0 - math.exp(-mean))
         logs = [math.log(ratio) if 0.0 < (ratio := likelihood_ratio(one)) < math.inf else 0.0 for one in scores]
@@ -254,12 +295,12 @@ def test_chances_are_those_under_which_what_was_heard_is_likeliest(heard: list[l
 def test_what_objects_are_goes_by_what_the_map_has_seen_at_their_places_so_far() -> None:
     fleet = FleetMap(GridSpec(SweepFrame(0.0, 0.0, 0.0), 10.0, columns=3, rows=2))
     objects = ObjectsOnMap()
-    objects.hear(5.0, 15.0, 0.0, 0.6, ("primary", 1))
-    objects.hear(25.0, 5.0, 0.0, 0.6)
-    objects.hear(25.0, 5.0, 0.0, 0.7)
-    assert len(objects) == 2
+    objects.hear(Sighting("primary", 5.0, 15.0, 0.0, 0.6), ("primary", 1))
+    objects.hear(Sighting("primary", 25.0, 5.0, 0.0, 0.6))
+    objects.hear(Sighting("primary", 25.0, 5.0, 0.0, 0.7))
+    assert len(objects.known()[0].x_m) == 2
     unseen = objects.known()[1]
-    objects.hear(25.0, 5.0, 0.0, 0.7, ("primary", 1))
+    objects.hear(Sighting("primary", 25.0, 5.0, 0.0, 0.7), ("primary", 1))
     assert objects.known()[1] is unseen
     objects.map = fleet
     assert objects.known()[1] is not unseen
@@ -277,7 +318,7 @@ def test_what_objects_are_goes_by_what_the_map_has_seen_at_their_places_so_far()
 def test_what_is_seen_hundreds_of_times_where_next_to_nothing_was_looked_at_still_is_something() -> None:
     objects = Objects()
     for _ in range(300):
-        objects.hear(0.0, 0.0, 0.0, 0.6)
+        objects.hear(Sighting("primary", 0.0, 0.0, 0.0, 0.6))
     assert objects.seen().chances(np.zeros(1))[0] == pytest.approx([0.0, 0.0, 1.0])
 
 
@@ -287,7 +328,7 @@ def test_what_is_as_likely_a_mine_as_not_is_listed_and_that_of_which_nothing_is_
 
 def test_nothing_heard_is_no_mine() -> None:
     objects = Objects()
-    assert len(objects) == 0
+    assert count(objects) == 0
     assert objects.seen().chances(np.zeros(0)).shape == (0, 3)
 
 

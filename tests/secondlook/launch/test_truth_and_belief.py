@@ -29,9 +29,9 @@ ODD = (
     "mission.rho=0.3",
 )
 TOLD = (
-    "the map is wrong on purpose: targets.correlation is 0.7, mission.rho 0.3; from other aspects looks share less, 90 "
-    "degrees apart nothing; targets are mines, and it takes them for alike; what it is told of P_d errs as "
-    "sensor.estimate of primary, helper says"
+    "the fleet is wrong on purpose: targets.correlation is 0.7, mission.rho 0.3; from other aspects looks share less, "
+    "90 degrees apart nothing; targets are mines, and it takes them for alike; targets.layout is lines, and it takes "
+    "them for spread at random; what it is told of P_d errs as sensor.estimate of primary, helper says"
 )
 
 
@@ -86,7 +86,7 @@ def test_the_report_tells_what_the_map_does_not_know(tmp_path: Path) -> None:
         (tmp_path / name).mkdir()
         run_mission(load_scenario(str(BRIEF), overrides), RunOptions(tmp_path / name, bus="local"))
         pages.append(report_page(secondlook.load(tmp_path / name)))
-    sentence = "were to be expected. The map is wrong on purpose: targets are mines, and it takes them for alike."
+    sentence = "were to be expected. The fleet is wrong on purpose: targets are mines, and it takes them for alike."
     assert sentence in pages[0]
     assert "wrong on purpose" not in pages[1]
     assert "at_odds" not in json.loads((tmp_path / "plain" / "summary.json").read_text())

@@ -8,6 +8,8 @@ from secondlook.preflight import expected_mission
 from secondlook.scenario import Scenario, at_odds, load_scenario, scenario_hash
 from secondlook.scenario.text import read_value
 
+ERRS = "what it is told of P_d errs as sensor.estimate of primary says"
+
 
 def odds(*overrides: str) -> str:
     return at_odds(load_scenario("tellaro", overrides))
@@ -26,11 +28,31 @@ def odds(*overrides: str) -> str:
             "from other aspects looks share less, 60 degrees apart nothing",
         ),
         (["targets.kinds=mines"], "targets are mines, and it takes them for alike"),
-        (["targets.layout.kind=lines"], ""),
+        (["targets.layout.kind=lines"], "targets.layout is lines, and it takes them for spread at random"),
+        (["targets.layout.kind=lines", "targets.count=0"], ""),
         (["vehicles.primary.sensor.false_alarms_per_km2=100"], ""),
         (
             ["vehicles.helper.sensor.estimate.bias=0.2"],
             "what it is told of P_d errs as sensor.estimate of helper says",
+        ),
+        (["vehicles.helper.sensor.estimate={turn_m: 50}"], ""),
+        (["vehicles.helper.sensor.estimate={blind_to_seabed: true}"], ""),
+        (
+            [f"vehicles.helper.sensor.{one}" for one in ("estimate.blind_to_seabed=true", "seabed_share=0")]
+            + ["seabed={kind: patchy}"],
+            "",
+        ),
+        *(
+            ([f"vehicles.primary.sensor.estimate={one}", "seabed={kind: patchy}"], ERRS)
+            for one in (
+                *("{bias_at_reach: -0.1}", "{bias_after_turn: 0.5}", "{drift_per_km: 0.1}", "{noise_along_m: 40}"),
+                "{blind_to_seabed: true}",
+            )
+        ),
+        ([f"vehicles.primary.sensor.{one}" for one in ("estimate.noise_along_m=40", "noise_cell=0")], ""),
+        (
+            ["vehicles.primary.position_error_m=10", "vehicles.helper.position_drift_m_per_h=3"],
+            "of primary, helper it takes positions for true that are off by up to what they tell",
         ),
         (
             ["targets.kinds=mines", "mission.rho=1"],
@@ -39,12 +61,12 @@ def odds(*overrides: str) -> str:
     ],
 )
 def test_what_the_map_does_not_know_is_told(overrides: list[str], told: str) -> None:
-    assert odds(*overrides) == (f"the map is wrong on purpose: {told}" if told else "")
+    assert odds(*overrides) == (f"the fleet is wrong on purpose: {told}" if told else "")
 
 
 def test_it_is_told_before_the_mission_is_flown() -> None:
     expected = expected_mission(load_scenario("tellaro", ["targets.correlation=1"]))
-    assert expected.warnings == ["the map is wrong on purpose: targets.correlation is 1, mission.rho 0"]
+    assert expected.warnings == ["the fleet is wrong on purpose: targets.correlation is 1, mission.rho 0"]
     assert expected_mission(load_scenario("tellaro")).warnings == []
 
 
