@@ -17,6 +17,7 @@ from typing import Any
 import secondlook
 
 ROOT = Path(__file__).parents[1]
+KEPT = ROOT / "docs" / "figures"
 DIGITS = 6  # of what is kept: more than tables tell
 
 Document = dict[str, Any]
@@ -95,3 +96,14 @@ def all_rounded(document: Any) -> Any:
 def some(row: Mapping[str, Any], names: Iterable[str]) -> Document:
     """Some of a row's figures, rounded."""
     return {name: round(row[name], DIGITS) if isinstance(row[name], float) else row[name] for name in names}
+
+
+def kept(name: str) -> Document:
+    """What is kept of a table's missions."""
+    return dict(json.loads((KEPT / f"{name}.json").read_text()))
+
+
+def keep(name: str, document: Document) -> None:
+    """Keeps what came of a table's missions, a line for each."""
+    KEPT.mkdir(exist_ok=True)
+    (KEPT / f"{name}.json").write_text(json.dumps(document).replace("}, {", "},\n{") + "\n")

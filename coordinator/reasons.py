@@ -17,6 +17,7 @@ MOST_CELLS = 12  # to a side of a strip that are looked at
 NAMED_SHARE = 0.25  # of a strip's risk, from which a track or a cause is named
 MOST_TRACKS = 3  # that are named
 NADIR_GAP, RANGE_END, BEYOND, BEST = "nadir gap", "range's end", "ends of tracks", "even where tracks see best"
+ACROSS = "across the tracks, as that leaves less"  # of a strip that is flown so
 CAUSES = (BEYOND, NADIR_GAP, RANGE_END, BEST)  # of which the first that holds counts
 
 

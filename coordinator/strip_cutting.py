@@ -21,7 +21,7 @@ from coordinator.cut.strips import Counted, Cut, CuttingRules
 from coordinator.expect.contacts import KnownContacts
 from coordinator.fleet import KnownFleet
 from coordinator.ledger import TAKEN
-from coordinator.reasons import Reasons
+from coordinator.reasons import ACROSS, Reasons
 from coordinator.sectors import Sector
 from coordinator.strip_life import StripLife
 from planner.footprints import footprint_of
@@ -101,9 +101,13 @@ class StripCutting:
         reasons = Reasons(self._grid, self._fleet.primaries, expected.risk)
 
         def why(cut: Cut) -> str:
-            told = reasons.why(replace(cut, window=cut.window.within(place)))
+            told = [reasons.why(replace(cut, window=cut.window.within(place)))]
             count = 0 if self._contacts is None else self._contacts.doubtful(cut.window)
-            return f"{told}; {count} contact{'s' if count > 1 else ''} that may be mines" if count else told
+            if count:
+                told.append("1 contact that may be a mine" if count == 1 else f"{count} contacts that may be mines")
+            if cut.window.across:
+                told.append(ACROSS)
+            return "; ".join(told)
 
         contacts = None
         if self._contacts is not None:

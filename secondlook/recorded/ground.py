@@ -83,7 +83,8 @@ class RiskMap:
 
     def cells_within(self, geometry: BaseGeometry) -> Cells:
         """Rows and columns of the cells inside the area whose centres lie within a geometry (mission frame) and not on
-        its border."""
+        its border. Raises UserError for what is no geometry of shapely's."""
+        check_geometry("geometry", geometry)
         near_rows, near_columns = self._around(geometry)
         rows, columns = np.nonzero(self.inside[near_rows, near_columns])
         rows, columns = rows + near_rows.start, columns + near_columns.start
@@ -105,6 +106,13 @@ class RiskMap:
     @cached_property
     def _centres(self) -> tuple[FloatArray, FloatArray]:
         return self.grid.frame.to_mission(self.grid.across_m[np.newaxis, :], self.grid.along_m[:, np.newaxis])
+
+
+def check_geometry(name: str, geometry: object) -> None:
+    """Raises UserError for what is no geometry of shapely's, such as a list of corners."""
+    if not isinstance(geometry, BaseGeometry):
+        told = type(geometry).__name__
+        raise UserError(f"{name}: a {told} is not allowed; must be a geometry, such as shapely.Polygon(corners)")
 
 
 def _span(places: FloatArray, count: int) -> slice:

@@ -10,6 +10,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from datetime import datetime, timedelta
 from functools import cached_property, partial
+from numbers import Real
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar, cast
 
@@ -50,6 +51,7 @@ from secondlook.recorded.ground import (
     ObjectRecord,
     RiskMap,
     TargetRecord,
+    check_geometry,
     contacts,
     objects,
     priorities,
@@ -151,8 +153,8 @@ class Mission(ABC):
         time, and for a vehicle that the fleet does not have.
         """
         fleet = [one.vehicle for one in self.run.vehicles]
-        if at_s is not None and not 0.0 <= at_s * 1000 < math.inf:
-            raise UserError(f"at_s: {at_s} is not allowed; must be a finite number of seconds, 0 or more")
+        if at_s is not None and not _is_time(at_s):
+            raise UserError(f"at_s: {at_s!r} is not allowed; must be a finite number of seconds, 0 or more")
         if isinstance(vehicles, str):  # would be taken for a list of its letters
             raise UserError(f"vehicles: {vehicles!r} is not allowed; must be a list of {', '.join(fleet)}")
         for name in vehicles or ():
@@ -180,10 +182,11 @@ class Mission(ABC):
 
         Each cell of the map counts by the share of it that lies there; so the whole area counts for a little more than
         without `within`, where cells count whose middle lies in it. All that was found, wherever, tells how dense mines
-        lie. Raises UserError where nothing of the area lies there, and where the geometry is not valid.
+        lie. Raises UserError where nothing of the area lies there, and for what is no geometry or not a valid one.
         """
         if within is None:
             return self._figures.mines_left()
+        check_geometry("within", within)
         if not within.is_valid:
             raise UserError(f"within: must be a valid geometry, but: {shapely.is_valid_reason(within)}")
         place = self._region.shares(within, self.run.grid.spec)
@@ -460,3 +463,8 @@ def _mapping(path: Path, parse: Any) -> Mapping[str, Any]:
     if not isinstance(content, dict):
         raise UserError(f"{path}: is not a mapping; must be as the run wrote it")
     return content
+
+
+def _is_time(value: object) -> bool:
+    """Whether it is a number of seconds of a mission."""
+    return isinstance(value, Real) and 0.0 <= float(value) * 1000 < math.inf

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
 import shapely
-from pydantic import AfterValidator, Field, ValidationInfo, field_validator
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
 from secondlook.scenario.area import Area, Point
 from secondlook.scenario.values import LEAST, Heading, Mapping, Share, refused
@@ -86,7 +86,7 @@ class Targets(Mapping):
     count: Annotated[int, Field(ge=0, le=MOST_TARGETS)] = Field(
         default_factory=_count, json_schema_extra={"default": USUAL_COUNT}
     )
-    """How many. Of places that are given it is left out."""
+    """How many. Of places that are given it is left out, or `null`."""
     correlation: Annotated[Share | None, AfterValidator(lambda share: share or None)] = Field(
         default=None, json_schema_extra={"default": 0}
     )
@@ -108,12 +108,20 @@ class Targets(Mapping):
     rocks and debris. The recogniser gives most of their contacts lower scores, as it does for false alarms
     (`sensor.false_alarms_per_km2`), but these are nothing, and each is raised once."""
 
+    @model_validator(mode="before")
+    @classmethod
+    def _leave_out(cls, data: Any) -> Any:
+        """A `count` of nothing is none: what a file tells cannot be left out otherwise by an override."""
+        if isinstance(data, dict) and data.get("count", 0) is None:
+            return {key: one for key, one in data.items() if key != "count"}
+        return data
+
     @field_validator("count")
     @classmethod
     def _check_count(cls, count: int, info: ValidationInfo) -> int:
         layout = info.data.get("layout")
         if isinstance(layout, PlacesLayout) and count != len(layout.places_m):
-            raise refused(f"must be left out beside places, of which there are {len(layout.places_m)}")
+            raise refused(f"must be left out, or null, beside places, of which there are {len(layout.places_m)}")
         return count
 
     @field_validator("aspect_deg")

@@ -31,7 +31,7 @@ from comms.said.topics import Topic
 from comms.strip_books import GONE, LEFT, StripBooks
 from coordinator.ledger import ALLOWED
 from coordinator.mission_end import GOAL_REACHED
-from coordinator.reasons import BEST, BEYOND, NADIR_GAP, RANGE_END
+from coordinator.reasons import ACROSS, BEST, BEYOND, NADIR_GAP, RANGE_END
 from secondlook.fleet.nodes import COORDINATOR
 from secondlook.storm.witness import NOTED, Witness
 from secondlook.testing.flight import Flight
@@ -204,7 +204,7 @@ REASONS: Mapping[str, str] = MappingProxyType(
 WHYS: Mapping[str, str] = MappingProxyType(
     {f"a strip lies at: {one}": one for one in (NADIR_GAP, RANGE_END, BEYOND, BEST)}
     | {"a strip is seen badly by a track": "seen badly by ", "a strip is foreseen beside a track": "expected beside "}
-    | {"a strip lies at contacts that may be mines": " that may be mines"}
+    | {"a strip lies at contacts that may be mines": " that may be ", "a strip lies across the tracks": ACROSS}
 )
 REFUSALS: Mapping[str, str] = MappingProxyType(
     {

@@ -7,6 +7,7 @@ The same trouble strikes alike in every flight and on every bus. Times are simul
 from __future__ import annotations
 
 import math
+from numbers import Real
 
 from comms.lockstep.events import Freeze, Join, Kill, NodeEvent, absent_at_start, timeline
 from comms.lockstep.faults import STRUCK, CutOff, FaultKind, Faults, MessageFault
@@ -204,8 +205,8 @@ class Trouble:
     def _time_ms(self, name: str, time_s: float | None) -> int:
         if time_s is None:
             return self._from_ms
-        if not 0 <= time_s < math.inf:
-            raise UserError(f"{name}: {time_s} is not allowed; must be simulated seconds since the mission's start")
+        if not isinstance(time_s, Real) or not 0 <= time_s < math.inf:
+            raise UserError(f"{name}: {time_s!r} is not allowed; must be simulated seconds since the mission's start")
         time_ms = round(time_s * 1000)
         if time_ms < self._from_ms:
             now_s = (self._from_ms - 1) / 1000
@@ -217,6 +218,6 @@ class Trouble:
 
 
 def _span_ms(name: str, span_s: float) -> int:
-    if not 0.001 <= span_s < math.inf:
-        raise UserError(f"{name}: {span_s} is not allowed; must be at least 0.001 simulated seconds")
+    if not isinstance(span_s, Real) or not 0.001 <= span_s < math.inf:
+        raise UserError(f"{name}: {span_s!r} is not allowed; must be at least 0.001 simulated seconds")
     return round(span_s * 1000)

@@ -110,10 +110,11 @@ def test_strips_run_across_the_tracks_where_helpers_fly_fewer_of_them_so_whether
     (strip,) = told.strips().values()
     assert (strip.start_x_m, strip.start_y_m, strip.length_m, strip.width_m) == (47.5, 125, 300, 50)
     assert strip.heading_rad == pytest.approx(math.pi / 2, abs=1e-5)
+    assert strip.why == "badly seen; across the tracks, as that leaves less"
 
 
 @pytest.mark.parametrize(
-    ("contacts", "told_of"), [(0, ""), (1, "; 1 contact that may be mines"), (2, "; 2 contacts that may be mines")]
+    ("contacts", "told_of"), [(0, ""), (1, "; 1 contact that may be a mine"), (2, "; 2 contacts that may be mines")]
 )
 def test_why_a_strip_is_cut_tells_of_the_contacts_in_it_that_may_be_mines(contacts: int, told_of: str) -> None:
     told = coordinator(contacts=True, idle=())

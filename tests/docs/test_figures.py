@@ -12,9 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bench import figures
-from bench.figures import TABLES, compared_kept, kept, linked_kept, reliability_lines, written
-from bench.flown import ROOT, Case, Mission, Table
+from bench import clearance_tables, figures, flown
+from bench.clearance_tables import reliability_lines
+from bench.figures import TABLES, compared_kept, written
+from bench.flown import ROOT, Case, Mission, Table, kept
+from bench.link_tables import linked_kept
 from bench.rows import by
 from secondlook.compare.paired import interval_of_mean
 from secondlook.launch.run_display import mines_left_words
@@ -40,15 +42,17 @@ def test_a_mission_of_it_still_leaves_what_is_kept(name: str, tmp_path: Path) ->
 
 def test_what_is_declared_to_be_flown_is_what_is_kept() -> None:
     declared = {
-        "clearance": Counter(dict.fromkeys(figures.CALIBRATED, 40)),
-        "goals": Counter(dict(figures.GOALS)),
-        "intervals": Counter(dict.fromkeys((case for case, _ in figures.MANY_TIMES), 1)),
-        "reliability": Counter({(one, (figures.RELIABLE_TARGETS, *told.split())): 1 for one, told in figures.RELIABLE}),
+        "clearance": Counter(dict.fromkeys(clearance_tables.CALIBRATED, 40)),
+        "goals": Counter(dict(clearance_tables.GOALS)),
+        "intervals": Counter(dict.fromkeys((case for case, _ in clearance_tables.MANY_TIMES), 1)),
+        "reliability": Counter(
+            {(one, (clearance_tables.RELIABLE_TARGETS, *told.split())): 1 for one, told in clearance_tables.RELIABLE}
+        ),
     }
     for name, cases in declared.items():
         assert Counter(case_of(row) for row in kept(name)["rows"]) == cases, name
     missions = {case_of(row): row["held"]["missions"] for row in kept("intervals")["rows"]}
-    assert missions == dict(figures.MANY_TIMES)
+    assert missions == dict(clearance_tables.MANY_TIMES)
 
 
 def case_of(row: dict[str, Any]) -> Case:
@@ -87,7 +91,7 @@ def words_of(page: str) -> str:
 
 def test_a_table_is_put_in_the_place_of_the_old_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(figures, "ROOT", tmp_path)
-    monkeypatch.setattr(figures, "KEPT", tmp_path)
+    monkeypatch.setattr(flown, "KEPT", tmp_path)
     mission = Mission("toy", (), 1, {"risk.mean": 0.5})
     table = Table("page.md", lambda _: {}, lambda document: ["| a |", f"| {document['a']} |"], lambda _: mission)
     monkeypatch.setitem(figures.TABLES, "toy", table)
@@ -100,8 +104,9 @@ def test_a_table_is_put_in_the_place_of_the_old_one(tmp_path: Path, monkeypatch:
 
 
 def test_broken_off_it_goes_on_with_what_was_flown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for name, folder in (("ROOT", tmp_path), ("KEPT", tmp_path / "kept"), ("UNDER_WAY", tmp_path / "under way")):
-        monkeypatch.setattr(figures, name, folder)
+    monkeypatch.setattr(figures, "ROOT", tmp_path)
+    monkeypatch.setattr(figures, "UNDER_WAY", tmp_path / "under way")
+    monkeypatch.setattr(flown, "KEPT", tmp_path / "kept")
     found = []
 
     def fly(folder: Path) -> dict[str, int]:

@@ -124,8 +124,8 @@ def test_the_risk_of_a_vehicle_that_is_not_there_is_refused(mission: RecordedMis
     assert not mission.risk(vehicles=[]).seen.any()
 
 
-@pytest.mark.parametrize("at_s", [math.nan, math.inf, -1.0])
-def test_the_risk_at_no_time_is_refused(mission: RecordedMission, at_s: float) -> None:
+@pytest.mark.parametrize("at_s", [math.nan, math.inf, -1.0, "60"])
+def test_the_risk_at_no_time_is_refused(mission: RecordedMission, at_s: Any) -> None:
     with pytest.raises(UserError, match=r"^at_s: .* is not allowed; must be a finite number of seconds, 0 or more$"):
         mission.risk(at_s)
 
@@ -153,6 +153,12 @@ def test_mines_left_in_parts_are_those_of_the_whole(mission: RecordedMission, su
             mission.mines_left(nowhere)
     with pytest.raises(UserError, match="within: must be a valid geometry, but: Self-intersection"):
         mission.mines_left(shapely.Polygon([(0, 0), (100, 100), (100, 0), (0, 100)]))
+    corners: Any = [(0, 0), (100, 100), (100, 0)]
+    told = r": a list is not allowed; must be a geometry, such as shapely\.Polygon\(corners\)$"
+    with pytest.raises(UserError, match=f"^within{told}"):
+        mission.mines_left(corners)
+    with pytest.raises(UserError, match=f"^geometry{told}"):
+        mission.risk().mean_within(corners)
 
 
 def test_what_is_truly_found_somewhere_is_told_by_the_targets_places(mission: RecordedMission) -> None:

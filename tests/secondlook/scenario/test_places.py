@@ -81,6 +81,13 @@ def test_the_scenario_as_run_needs_the_file_no_more_and_is_the_same(load: Load, 
     assert scenario_hash(again) == scenario_hash(scenario)
 
 
+def test_of_a_count_in_a_file_nothing_is_left_by_an_override(tmp_path: Path) -> None:
+    (tmp_path / "mines.csv").write_text("x_m,y_m\n1,2\n3,4\n")
+    layout = f"targets.layout={{file: {tmp_path / 'mines.csv'}}}"
+    assert load_scenario("tellaro", [layout, "targets.count=null"]).targets.count == 2
+    assert load_scenario("tellaro", ["targets.count=null"]).targets.count == 200
+
+
 EITHER = "x_m and y_m or longitude_deg and latitude_deg"
 LIMITS = "must be a number from -1e+06 to 1e+06"
 POLYGON = {"type": "Polygon", "coordinates": []}
@@ -142,7 +149,7 @@ def test_what_is_wrong_with_a_file_is_told(load: Load, name: str, text: str | by
         (
             "x_m,y_m\n1,1\n2,2",
             ", count: 3",
-            "targets.count: 3 is not allowed; must be left out beside places, of which there are 2",
+            "targets.count: 3 is not allowed; must be left out, or null, beside places, of which there are 2",
         ),
     ],
 )

@@ -422,6 +422,11 @@ def times_s_of(heard: Heard, keys: str) -> list[float]:
             "'helpr' cannot be killed, frozen or joined; must be one of primary, helper",
         ),
         (lambda fleet: fleet.kill("helper", at_s=-1), "at_s: -1 is not allowed; must be simulated seconds since the"),
+        (lambda fleet: fleet.kill("helper", at_s="3"), "at_s: '3' is not allowed; must be simulated seconds since the"),
+        (
+            lambda fleet: fleet.freeze("helper", for_s="3"),
+            "for_s: '3' is not allowed; must be at least 0.001 simulated",
+        ),
         (lambda fleet: fleet.kill("helper", at_s=float("nan")), "at_s: nan is not allowed; must be simulated seconds"),
         (lambda fleet: [fleet.kill("helper", at_s=5), fleet.kill("helper", at_s=6)], "helper: kill at 6000 ms is not"),
         (lambda fleet: fleet.freeze("helper", at_s=5, for_s=0), "for_s: 0 is not allowed; must be at least 0.001 sim"),

@@ -1,0 +1,185 @@
+"""The tables of docs/clearance.md: how many mines are left and may one believe it, goals, contacts, reliability."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+
+from bench import calibration, predicted_risk
+from bench.flown import DIGITS, ROOT, Case, Document, Table, fly_overridden, some
+from bench.rows import head, line, values_of
+from secondlook.scenario import load_scenario
+
+CALIBRATED: tuple[Case, ...] = (
+    ("tellaro", ()),
+    ("two-helpers", ()),
+    ("patchy", ()),
+    ("tellaro", ("targets.correlation=1", "mission.rho=1")),
+    ("tellaro", ("targets.correlation=1",)),
+    ("tellaro", ("mission.rho=1",)),
+    ("tellaro", tuple(f"vehicles.{one}.sensor.false_alarms_per_km2=200" for one in ("primary", "helper"))),
+    ("tellaro", ("targets.kinds=mines",)),
+    ("tellaro", tuple(f"vehicles.{one}.sensor.estimate.bias=0.2" for one in ("primary", "helper"))),
+    ("patchy", ("vehicles.primary.sensor.estimate.blind_to_seabed=true",)),
+    ("tellaro", tuple(f"vehicles.{one}.position_error_m=10" for one in ("primary", "helper"))),
+    ("two-helpers", tuple(f"vehicles.{one}.position_error_m=10" for one in ("primary", "west", "east"))),
+)
+"""What is true, or told of, otherwise than in a scenario as it is."""
+
+SMALL = "area.polygon_m=[[0, 0], [404, 0], [404, 133], [0, 133]]"
+MANY_TIMES: tuple[tuple[Case, int], ...] = (
+    (("tellaro", (SMALL,)), 10_000),
+    (("tellaro", (SMALL, "targets.correlation=1", "mission.rho=1")), 1_000),
+    (("tellaro", (SMALL, "seabed={kind: patchy}")), 1_000),
+)
+"""What is flown so often that one may tell 90 % from 88 and 92."""
+
+HELPERS_TWICE = "mission.deadline_factor=2"
+GOALS: tuple[tuple[Case, int], ...] = (
+    (("tellaro", ("mission.goal={kind: cleared, clearance: 0.6}",)), 60),
+    (("patchy", (HELPERS_TWICE, "mission.goal={kind: cleared, clearance: 0.6}")), 60),
+    (("two-helpers", (HELPERS_TWICE, "mission.goal={kind: cleared, clearance: 0.9}")), 60),
+    (("two-helpers", (HELPERS_TWICE, "targets.count=10", "mission.goal={kind: none_left, chance: 0.5}")), 60),
+    (
+        (
+            "two-helpers",
+            (
+                "targets.count=20",
+                "mission.goal={kind: lane, lane_m: [[600, 20], [600, 380]], width_m: 30, risk: 0.1}",
+            ),
+        ),
+        300,
+    ),
+)
+"""What missions are flown for, and what they need to reach it; how many are."""
+
+SHARED = "targets.correlation={0} mission.rho={0}"
+_BOTH = ("primary", "helper")
+RELIABLE: tuple[tuple[str, str], ...] = (
+    ("tellaro", ""),
+    ("tellaro", SHARED.format(0.5)),
+    ("tellaro", SHARED.format(1)),
+    ("tellaro", " ".join((SHARED.format(1), *(f"vehicles.{one}.sensor.noise_cell=0" for one in _BOTH)))),
+    ("two-helpers", ""),
+    ("patchy", ""),
+    ("tellaro", "mission.rho=1"),
+    ("tellaro", " ".join(f"vehicles.{one}.sensor.estimate.bias=0.2" for one in _BOTH)),
+    ("tellaro", " ".join(f"vehicles.{one}.position_error_m=10" for one in _BOTH)),
+    ("patchy", "vehicles.primary.sensor.estimate.blind_to_seabed=true"),
+)
+"""Scenarios, and what is true or believed otherwise than in them: right, and wrong."""
+RELIABLE_MISSIONS, RELIABLE_TARGETS = 60, "targets.count=1000"
+RELIABILITY_FILE = ROOT / "docs" / "reliability.png"
+
+CLUTTERED = ("tellaro", "two-helpers", "patchy", "clear")
+CLUTTER = ("targets.count=20", "targets.clutter_per_km2=100")
+FALSE_ALARMS = "vehicles.{}.sensor.false_alarms_per_km2=20"
+CONTACTS = [(f"coordinator.contacts={told}",) for told in ("false", "true")]
+RIVALLED = ("tellaro", "clear")
+RIVALS = (("coordinator.allocator=nearest",), ("coordinator.strips=lanes", "coordinator.contacts=false"))
+"""Whose planning is no better than that, or who is told beforehand."""
+CONTACT_COLUMNS = ("scenario", "coordinator.contacts", "coordinator.allocator", "coordinator.strips")
+
+
+def _fly_calibrated(folder: Path) -> Document:
+    return fly_overridden(folder, CALIBRATED, "1..40", calibration.LEFT_FIGURES)
+
+
+def _fly_many_times(folder: Path) -> Document:
+    rows = []
+    for place, ((scenario, overrides), seeds) in enumerate(MANY_TIMES):
+        flown = fly_overridden(folder / str(place), [(scenario, overrides)], f"1..{seeds}", calibration.LEFT_FIGURES)
+        first, *_ = missions = [row for row in flown["rows"] if row["failure"] is None]
+        told = {name: first[name] for name in ("scenario", "overrides", *calibration.LEFT_FIGURES)}
+        rows.append(told | {"held": asdict(calibration.Held.of(missions))})
+    return {"rows": rows}
+
+
+def held_lines(document: Document) -> list[str]:
+    """A line for each case."""
+    varied = ("scenario", "overrides")
+    cases = ((values_of(row, varied), calibration.Held(**row["held"])) for row in document["rows"])
+    return [*head(varied, calibration.HEADS), *(line(values, held.figures()) for values, held in cases)]
+
+
+def _fly_goals(folder: Path) -> Document:
+    rows = []
+    for place, (case, missions) in enumerate(GOALS):
+        rows += fly_overridden(folder / str(place), [case], f"1..{missions}", calibration.GOAL_FIGURES)["rows"]
+    return {"rows": rows}
+
+
+def _fly_cluttered(folder: Path) -> Document:
+    flown: list[Case] = []
+    for scenario in CLUTTERED:
+        alarms = [FALSE_ALARMS.format(name) for name in load_scenario(scenario).vehicles]
+        otherwise = (*CONTACTS, *(RIVALS if scenario in RIVALLED else ()))
+        flown += [(scenario, (*CLUTTER, *alarms, *one)) for one in otherwise]
+    return fly_overridden(folder, flown, "1..20", calibration.CONTACT_FIGURES)
+
+
+def _fly_reliable(folder: Path) -> Document:
+    rows = []
+    for scenario, told in RELIABLE:
+        overrides = [RELIABLE_TARGETS, *told.split()]
+        met = predicted_risk.fly_all(scenario, overrides, RELIABLE_MISSIONS)
+        bins = [[round(one.predicted, DIGITS), round(one.missed, DIGITS), one.targets] for one in met.bins]
+        rows.append({"scenario": scenario, "overrides": overrides, "seed": 1, **some(met.left, met.left), "bins": bins})
+    return {"rows": rows}
+
+
+def reliability_bins(row: Document) -> list[predicted_risk.Bin]:
+    """What is kept of a case."""
+    return [predicted_risk.Bin(*one) for one in row["bins"]]
+
+
+def draw_reliability(document: Document) -> None:
+    """The diagrams of all cases."""
+    cases = {
+        "\n".join([row["scenario"], *row["overrides"][1:]]) + "\n": reliability_bins(row) for row in document["rows"]
+    }
+    predicted_risk.draw(cases, across=3).savefig(RELIABILITY_FILE, dpi=70)
+
+
+def reliability_lines(document: Document) -> list[str]:
+    """A line for each case."""
+    lines = ["| `scenario` | otherwise | missed | predicted | calibration error |", f"|{'---|' * 5}"]
+    for row in document["rows"]:
+        bins = reliability_bins(row)
+        count = sum(one.targets for one in bins)
+        missed, predicted = (sum(one[at] * one.targets for one in bins) / count for at in (1, 0))
+        told = [one for one in row["overrides"] if one != RELIABLE_TARGETS]
+        error = predicted_risk.calibration_error(bins)
+        words = " ".join(f"`{one}`" for one in told) or "-"
+        lines.append(f"| `{row['scenario']}` | {words} | {missed:.3f} | {predicted:.3f} | {error:.3f} |")
+    return lines
+
+
+TABLES: dict[str, Table] = {
+    "clearance": Table(
+        page="docs/clearance.md",
+        fly=_fly_calibrated,
+        lines=lambda document: calibration.table(document["rows"], ("scenario", "overrides")),
+    ),
+    "intervals": Table(
+        page="docs/clearance.md",
+        fly=_fly_many_times,
+        lines=held_lines,
+    ),
+    "goals": Table(
+        page="docs/clearance.md",
+        fly=_fly_goals,
+        lines=lambda document: calibration.goal_table(document["rows"], ("scenario", "overrides")),
+    ),
+    "contacts": Table(
+        page="docs/clearance.md",
+        fly=_fly_cluttered,
+        lines=lambda document: calibration.contact_table(document["rows"], CONTACT_COLUMNS),
+    ),
+    "reliability": Table(
+        page="docs/clearance.md",
+        fly=_fly_reliable,
+        lines=reliability_lines,
+        draw=draw_reliability,
+    ),
+}
