@@ -5,10 +5,15 @@
 mines were left on average and how many were told, the share of missions whose 90 % interval holds the truth, with the
 95 % interval of that share, and how many have more left than that interval, and fewer. Of missions that were flown for
 a goal a second table tells how many have reached it, and in how many of these it is so in truth.
+
+`python -m bench.calibration --diagram FILE.png --missions 60 SCENARIO [KEY=VALUE ...]` asks the same of places: it
+flies the scenario with 1000 targets and the seeds from 1 on, tells which share was missed and which was predicted, and
+draws the one over the other for bins of predicted risk: the reliability diagram.
 """
 
 from __future__ import annotations
 
+import argparse
 import math
 import sys
 from collections.abc import Iterable, Sequence
@@ -17,8 +22,10 @@ from operator import itemgetter
 from statistics import fmean
 
 import secondlook
+from bench import predicted_risk
 from bench.rows import MISSION, Column, Row, by, head, line, mean_table
 from secondlook.errors import UserError
+from secondlook.scenario import load_scenario
 
 HEADS = ("missions", "left", "told", "within 90 %", "95 % of that", "more left", "fewer")
 MANY = 1000
@@ -107,11 +114,19 @@ def contact_table(rows: Iterable[Row], varied: Sequence[str]) -> list[str]:
     return mean_table(rows, varied, CONTACT_COLUMNS, "truth.listed_share")
 
 
-def main(folders: Sequence[str]) -> int:
-    """Prints the table of these folders, each of a sweep."""
-    rows, varied = list[Row](), dict[str, None]()
+def main(arguments: Sequence[str]) -> int:
+    """Prints the table of these folders, each of a sweep; or flies a scenario for its diagram."""
+    parser = argparse.ArgumentParser(prog="python -m bench.calibration", description=__doc__)
+    parser.add_argument("names", nargs="+", metavar="DIR", help="folders of sweeps, or a scenario with overrides")
+    parser.add_argument("--diagram", metavar="FILE.png", help="fly a scenario and draw its reliability diagram")
+    parser.add_argument("--missions", type=int, default=60, help="for the diagram (default 60)")
+    told = parser.parse_args(arguments)
     try:
-        for folder in folders:
+        if told.diagram is not None:
+            print(reliability(told.names[0], told.names[1:], told.missions, told.diagram))
+            return 0
+        rows, varied = list[Row](), dict[str, None]()
+        for folder in told.names:
             sweep = secondlook.load_sweep(folder)
             varied |= dict.fromkeys(["scenario", *sweep.vary])
             rows += [{**row, "scenario": sweep.scenario} for row in sweep.table.to_pylist()]
@@ -120,6 +135,17 @@ def main(folders: Sequence[str]) -> int:
         return 2
     print("\n".join([*table(rows, list(varied)), "", *goal_table(rows, list(varied))]).rstrip())
     return 0
+
+
+def reliability(scenario: str, overrides: Sequence[str], missions: int, file: str) -> str:
+    """Flies missions with 1000 targets each, unless an override says otherwise, and draws their diagram. Returns what
+    was missed and what was predicted, in words."""
+    told = ["targets.count=1000", *overrides]
+    load_scenario(scenario, told)  # refuses here what is wrong with it, not in each process
+    met = predicted_risk.fly_all(scenario, told, missions)
+    predicted_risk.draw({"\n".join([scenario, *overrides]) + "\n": met.bins}).savefig(file, dpi=110)
+    error = predicted_risk.calibration_error(met.bins)
+    return f"missed {met.missed.mean():.3f}, predicted {met.risk.mean():.3f}, calibration error {error:.3f}; {file}"
 
 
 if __name__ == "__main__":

@@ -337,7 +337,8 @@ def first_sentence(path: Path) -> str:
 
 def decisions_page() -> str:
     """The decisions by their titles."""
-    lines = ["# Decisions", "", MADE, "", "What was decided, why, and what it costs; a file each.", ""]
+    lines = ["# Decisions", "", MADE, ""]
+    lines += ["What was decided, why, and what it costs; a file each. Figures in them are those of that time.", ""]
     for file in sorted((ROOT / "docs/decisions").glob("0*.md")):
         number, title = file.read_text(encoding="utf-8").splitlines()[0].removeprefix("# ").split(". ", 1)
         lines.append(f"{number}. [{title}]({file.name})")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +42,19 @@ def test_the_interval_of_a_share_is_wilsons() -> None:
 def test_what_is_no_sweep_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([str(tmp_path)]) == 2
     assert "is not the folder of a sweep" in capsys.readouterr().err
+
+
+def test_of_a_scenario_it_is_drawn_which_share_was_missed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    picture = tmp_path / "diagram.png"
+    area, count = "area.polygon_m=[[0, 0], [300, 0], [300, 100], [0, 100]]", "targets.count=300"
+    assert main(["--diagram", str(picture), "--missions", "2", "tellaro", area, count]) == 0
+    told = re.fullmatch(r"missed (0\.\d+), predicted (0\.\d+), calibration error 0\.\d+; .*\n", capsys.readouterr().out)
+    assert told is not None
+    missed, predicted = map(float, told.groups())
+    assert missed == pytest.approx(predicted, abs=0.1)
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert main(["--diagram", str(picture), "--missions", "2", "tellaro", "targets.count=-1"]) == 2
+    assert "targets.count: -1 is not allowed" in capsys.readouterr().err
 
 
 def test_of_goals_it_is_told_how_often_they_are_reached_and_are_so() -> None:

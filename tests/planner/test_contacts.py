@@ -51,6 +51,14 @@ def test_a_vehicle_is_off_by_as_much_as_it_was_but_for_its_drift() -> None:
         assert count(objects) == found, apart_m
 
 
+def test_a_vehicle_has_an_object_where_and_as_its_contacts_of_it_are_on_average() -> None:
+    for last_m, found in ((5.4, 1), (5.6, 2)):  # at 1 m, told to 10 m: 1.5 m of drift since
+        objects = Objects()
+        for x_m, sigma_m in ((0.0, 9.0), (2.0, 11.0), (last_m, 11.5)):
+            objects.hear(Sighting("primary", x_m, 0.0, sigma_m, 0.8))
+        assert count(objects) == found, last_m
+
+
 def test_what_one_vehicle_has_told_apart_another_does_not_join() -> None:
     objects = Objects()
     objects.hear(Sighting("helper", 0.0, 0.0, 0.0, 0.8))
@@ -79,6 +87,16 @@ def test_an_object_is_found_from_wherever_it_is_within_reach(east_m: float, nort
         objects.hear(Sighting("primary", 10.0, -10.0, 0.0, 0.8))
         objects.hear(Sighting("helper", 10.0 + times * east_m, -10.0 + times * north_m, 20.0, 0.8))
         assert count(objects) == found
+
+
+@pytest.mark.parametrize("turned", [(1, 0), (-1, 0), (0, 1), (0, -1)])
+def test_an_object_is_found_again_however_far_it_lies_from_where_the_vehicle_has_drifted(
+    turned: tuple[int, int],
+) -> None:
+    objects = Objects()
+    for name, away_m, sigma_m in (("helper", 60.1, 0.0), ("primary", 3.2, 20.0), ("primary", -53.7, 40.0)):
+        objects.hear(Sighting(name, turned[0] * away_m, turned[1] * away_m, sigma_m, 0.8))
+    assert count(objects) == 1
 
 
 def test_an_object_lies_at_the_mean_of_its_contacts_each_by_how_sure_it_is() -> None:

@@ -46,6 +46,39 @@ def test_a_single_pair_tells_little_and_two_that_agree_nearly_all() -> None:
         assert share == pytest.approx({1: 0.57, 2: 0.99}[pairs], abs=0.02)
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_guesses_weigh_as_bayes_rule_has_it(seed: int) -> None:
+    """Five places on six, the same thing told as far apart as both have drifted, and a metre."""
+    rng = np.random.default_rng(seed)
+    known = np.column_stack([rng.uniform(0.0, 60.0, (6, 2)), rng.uniform(1.0, 3.0, 6)])
+    places = np.column_stack([known[:5, :2] + (3.0, 4.0) + rng.normal(0.0, 1.0, (5, 2)), rng.uniform(4.0, 9.0, 5)])
+    prior_m2 = known[:, 2].mean() ** 2 + places[:, 2].mean() ** 2
+    drift_m2 = known[:, 2].var() + places[:, 2].var()
+    reach_m2, same_m2 = 9.0 * (prior_m2 + drift_m2 + 1.0), drift_m2 + 1.0
+
+    def falls(apart: FloatArray, guess: FloatArray) -> float:
+        return math.exp(-((apart - guess) ** 2).sum() / same_m2 / 2)
+
+    pairs = [[one - other for other in known[:, :2]] for one in places[:, :2]]
+    pairs = [[apart for apart in of_one if (apart**2).sum() <= reach_m2] for of_one in pairs]
+    guesses = [apart for of_one in pairs for apart in of_one]
+    of_each = sum(map(bool, pairs))
+    weights = []
+    for guess in guesses:
+        told = [sum(falls(apart, guess) for apart in of_one) / same_m2 / 2 * reach_m2 for of_one in pairs if of_one]
+        told = [one * of_each / len(guesses) for one in told]
+        seen_so = sum(math.prod(1 - share + share * one for one in told) for share in np.arange(0.025, 1.0, 0.05))
+        as_likely = math.exp(-(guess**2).sum() / prior_m2 / 2) * same_m2 / prior_m2
+        weights.append(seen_so * as_likely / sum(falls(other, guess) for other in guesses))
+    none = sum((1 - share) ** of_each for share in np.arange(0.025, 1.0, 0.05))
+    mean = sum(weight * guess for weight, guess in zip(weights, guesses, strict=True)) / (sum(weights) + none)
+    off_m2 = sum(weight * ((guess - mean) ** 2).sum() for weight, guess in zip(weights, guesses, strict=True)) / 2
+    off_m2 = (off_m2 + none * (prior_m2 + (mean**2).sum() / 2)) / (sum(weights) + none)
+    frame = registered({"helper": known, "primary": places})["primary"]
+    assert (frame.east_m, frame.north_m) == pytest.approx(mean, abs=0.006)
+    assert frame.sigma_m == pytest.approx(min(math.sqrt(off_m2 + drift_m2), math.sqrt(prior_m2)), abs=0.006)
+
+
 def test_those_who_have_seen_nothing_together_lie_where_they_say() -> None:
     apart = {"helper": seen((0, 0), (10, 0), sigma_m=3.0), "primary": seen((500, 0), sigma_m=4.0)}
     assert registered(apart)["primary"] == Frame(0.0, 0.0, 5.0, round(math.hypot(3.0, 5.0), 2))
