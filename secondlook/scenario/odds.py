@@ -47,4 +47,4 @@ def _errs(sensor: SensorBase, scenario: Scenario) -> bool:
 def _places(scenario: Scenario) -> Iterator[str]:
     off = [name for name, one in scenario.vehicles.items() if one.position_error_m or one.position_drift_m_per_h]
     if off:
-        yield f"of {', '.join(off)} it takes positions for true that are off by up to what they tell"
+        yield f"it takes the positions that {', '.join(off)} tell for true, and they are off"

@@ -52,7 +52,7 @@ def odds(*overrides: str) -> str:
         ([f"vehicles.primary.sensor.{one}" for one in ("estimate.noise_along_m=40", "noise_cell=0")], ""),
         (
             ["vehicles.primary.position_error_m=10", "vehicles.helper.position_drift_m_per_h=3"],
-            "of primary, helper it takes positions for true that are off by up to what they tell",
+            "it takes the positions that primary, helper tell for true, and they are off",
         ),
         (
             ["targets.kinds=mines", "mission.rho=1"],
