@@ -19,6 +19,7 @@ import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
+from pathlib import Path
 from statistics import fmean
 
 import secondlook
@@ -123,6 +124,11 @@ def main(arguments: Sequence[str]) -> int:
     told = parser.parse_args(arguments)
     try:
         if told.diagram is not None:
+            if told.missions < 1:
+                raise UserError(f"--missions: {told.missions} is not allowed; must be at least 1")
+            file = Path(told.diagram)
+            if file.suffix != ".png" or not file.parent.is_dir():
+                raise UserError(f"--diagram: {file} is not allowed; must end in .png, in a folder that is there")
             print(reliability(told.names[0], told.names[1:], told.missions, told.diagram))
             return 0
         rows, varied = list[Row](), dict[str, None]()

@@ -34,12 +34,15 @@ MANY_TIMES: tuple[tuple[Case, int], ...] = (
 )
 """What is flown so often that one may tell 90 % from 88 and 92."""
 
-HELPERS_TWICE = "mission.deadline_factor=2"
+LONGER = "mission.deadline_factor={}"
+NONE_LEFT = "mission.goal={{kind: none_left, chance: {}}}"
 GOALS: tuple[tuple[Case, int], ...] = (
     (("tellaro", ("mission.goal={kind: cleared, clearance: 0.6}",)), 60),
-    (("patchy", (HELPERS_TWICE, "mission.goal={kind: cleared, clearance: 0.6}")), 60),
-    (("two-helpers", (HELPERS_TWICE, "mission.goal={kind: cleared, clearance: 0.9}")), 60),
-    (("two-helpers", (HELPERS_TWICE, "targets.count=10", "mission.goal={kind: none_left, chance: 0.5}")), 60),
+    (("patchy", (LONGER.format(2), "mission.goal={kind: cleared, clearance: 0.6}")), 60),
+    (("two-helpers", (LONGER.format(2), "mission.goal={kind: cleared, clearance: 0.9}")), 60),
+    (("two-helpers", (LONGER.format(4), "mission.goal={kind: cleared, clearance: 0.96}")), 60),
+    (("two-helpers", (LONGER.format(4), "targets.count=10", NONE_LEFT.format(0.8))), 60),
+    (("two-helpers", (LONGER.format(6), "targets.count=10", "coordinator.worth_risk=0.01", NONE_LEFT.format(0.9))), 60),
     (
         (
             "two-helpers",

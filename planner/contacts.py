@@ -33,6 +33,8 @@ LEAST_NATS = 1e-3  # of what was seen: a map may come later than a contact
 LISTED_FROM = 0.35
 """Chance to be a mine from which an object is listed as one: a mine that is not on the list costs more than a stone
 that is."""
+OTHERS_UP_TO = 0.75
+"""No clutter and no false alarm is taken to score higher."""
 COINCIDENCE = 1e-3  # how likely an alarm is raised again where one was, of nothing
 
 
@@ -41,8 +43,10 @@ def likelihood_ratio(score: float) -> float:
 
     The recogniser's scores of mines are 0.5 + 0.5 B(2, 2), of false alarms 0.75 B(2, 3), B a beta distribution.
     """
+    if score >= OTHERS_UP_TO:  # the surest score, which none has in theory, too
+        return math.inf
     mine, other = _mine_density(score), _other_density(score)
-    return mine / other if other > 0.0 else math.inf if mine > 0.0 else 0.0
+    return mine / other if other > 0.0 else 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -292,7 +296,7 @@ def _mine_density(score: float) -> float:
 
 
 def _other_density(score: float) -> float:
-    over = score / 0.75
+    over = score / OTHERS_UP_TO
     return 16.0 * over * (1.0 - over) ** 2 if 0.0 < over < 1.0 else 0.0
 
 

@@ -11,6 +11,8 @@ from planner.clearance import MinesLeft
 from planner.region import Region
 from planner.types import FloatArray, GridSpec, Point
 
+DECIMALS = 9  # of a chance: its last bits hang on the processor
+
 
 @dataclass(frozen=True)
 class Lane:
@@ -51,7 +53,7 @@ class Goal:
 
     def is_reached(self, left: MinesLeft | None) -> bool:
         """Whether it is so with the chance that is wanted."""
-        return self.chance_now(left) >= self.chance
+        return round(self.chance_now(left), DECIMALS) >= self.chance
 
     def cleared_with(self, left: MinesLeft | None) -> float:
         """The share of the mines that is found with the chance that is wanted; 0 where nothing was seen."""

@@ -129,6 +129,7 @@ class SensorConfig:
     half_at_crab_rad: float | None = None
     estimate: EstimateConfig = field(default_factory=EstimateConfig)
     false_alarms_per_km2: float = 0.0
+    others_up_to: float = 0.75
 
     def __post_init__(self) -> None:
         ranges, values = self.curve.range_m, self.curve.p_detect
@@ -159,6 +160,7 @@ class SensorConfig:
         _require(half_rad is None or 1e-3 <= half_rad <= math.pi / 2, "half_at_crab_rad", half_rad, "0.001 to pi / 2")
         alarms = self.false_alarms_per_km2
         _require(0.0 <= alarms <= 1e6, "false_alarms_per_km2", alarms, "0 to 1e6")
+        _require(0.0 < self.others_up_to <= 1.0, "others_up_to", self.others_up_to, "above 0, to 1")
         # The looks of a sector ahead overlap: their cells do not lie one behind the other.
         beside = self.footprint == "side" or self.estimate.noise_along_m is None
         _require(beside, "estimate.noise_along_m", self.estimate.noise_along_m, "None but for the footprint side")

@@ -98,10 +98,11 @@ class Recogniser:
     lower.
 
     `false_alarms_per_km2`: how many false alarms are expected a square kilometre of swath, both sides together,
-    between the ranges at which `curve` rises above 0.
+    between the ranges at which `curve` rises above 0. `others_up_to`: how high what is no target scores at most.
     """
 
-    def __init__(self, curve: DetectionCurve, *, false_alarms_per_km2: float) -> None:
+    def __init__(self, curve: DetectionCurve, *, false_alarms_per_km2: float, others_up_to: float = 0.75) -> None:
+        self._others_up_to = others_up_to
         self.raises_false_alarms = false_alarms_per_km2 > 0.0
         self._false_alarms_per_m2 = false_alarms_per_km2 / M2_PER_KM2
         seen = np.flatnonzero(curve.p_detect > 0.0)
@@ -116,7 +117,7 @@ class Recogniser:
         the contacts made."""
         detected = generator.random(chances.shape) < chances
         if clutter:
-            scores = 0.75 * generator.beta(2.0, 3.0, chances.shape)
+            scores = self._others_up_to * generator.beta(2.0, 3.0, chances.shape)
         else:
             scores = 0.5 + 0.5 * generator.beta(2.0, 2.0, chances.shape)
         return detected, _contacts(passed.along_m[detected], passed.lateral_m[detected], scores[detected])
@@ -126,7 +127,7 @@ class Recogniser:
         ranges_m = self._nearest_m, self._farthest_m
         count = generator.poisson(self._false_alarms_per_m2 * swath.area_m2(*ranges_m))
         along_m, lateral_m = swath.scattered(count, *ranges_m, generator)
-        return _contacts(along_m, lateral_m, 0.75 * generator.beta(2.0, 3.0, count))
+        return _contacts(along_m, lateral_m, self._others_up_to * generator.beta(2.0, 3.0, count))
 
 
 def _contacts(along_m: FloatArray, lateral_m: FloatArray, scores: FloatArray) -> list[LookContact]:

@@ -40,7 +40,9 @@ class Body:
             believed=sensor.believed_over(seabed, config.vehicle),
             targets=targets,
             clutter=clutter,
-            recogniser=Recogniser(sensor.curve, false_alarms_per_km2=sensor.false_alarms_per_km2),
+            recogniser=Recogniser(
+                sensor.curve, false_alarms_per_km2=sensor.false_alarms_per_km2, others_up_to=sensor.others_up_to
+            ),
             seed=world.seed,
             current=current,
         )

@@ -24,7 +24,7 @@ SERIES = {
 
 class Mines:
     """Draws them every DRAW_EVERY_MS of the mission from what contacts, P(y) and the map, with the area's cells
-    `inside`, tell then; nothing before the first contact."""
+    `inside`, tell then; nothing before a first look."""
 
     def __init__(self, canvas: Canvas, map_: FleetMap, inside: BoolArray) -> None:
         self._canvas, self._map, self._inside = canvas, map_, inside
@@ -56,8 +56,6 @@ class Mines:
         self._draw(time_ms)
 
     def _draw(self, time_ms: int) -> None:
-        if not self._objects.known()[0].x_m.size:
-            return
         found = self._objects.mines
         scatter = scatter_of_all(list(one.values()) for one in self._curves.values())
         left = mines_left_by(self._map, self._inside, found, scatter)

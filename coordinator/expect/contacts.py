@@ -50,7 +50,7 @@ class KnownContacts:
         rows, columns = self._fleet.map.grid.cells_of(seen.x_m, seen.y_m)
         there = (rows >= window.first_row) & (rows < window.end_row)
         there &= (columns >= window.first_column) & (columns < window.end_column)
-        return int((there & (np.abs(chances[:, 0] - 0.5) < DOUBTFUL)).sum())
+        return int((there & (rounded(np.abs(chances[:, 0] - 0.5)) < DOUBTFUL)).sum())
 
     def worth(self, window: Window, look: FloatArray, weights: FloatArray) -> FloatArray | None:
         """What a further look counts at the cells of a window of the map for the objects there, seen from along the

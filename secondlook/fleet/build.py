@@ -13,6 +13,7 @@ from comms.said.announcement import ClockMode, Grid, Hole, Role, RunInfo, Vertex
 from comms.said.codec import SCHEMA_VERSION
 from comms.said.routing import RosterNode, Routing, driver_of, modem_of
 from coordinator.config import CoordinatorConfig
+from planner.contacts import OTHERS_UP_TO
 from planner.footprints import footprint_of
 from planner.region import Region
 from planner.types import Point, PriorityGround
@@ -327,6 +328,7 @@ def _sensor(vehicle: SurveyVehicle | RevisitVehicle) -> SensorConfig:
         half_at_crab_rad=None if sensor.half_at_crab_deg is None else math.radians(sensor.half_at_crab_deg),
         estimate=EstimateConfig() if sensor.estimate is None else EstimateConfig(**sensor.estimate.model_dump()),
         false_alarms_per_km2=sensor.false_alarms_per_km2 or 0.0,
+        others_up_to=OTHERS_UP_TO if sensor.others_up_to is None else sensor.others_up_to,
     )
 
 

@@ -232,6 +232,11 @@ class Scenario(Mapping):
         """Whether contacts are looked at again."""
         if self.coordinator.contacts is not None or self.link is not None:
             return bool(self.coordinator.contacts)
+        return self.has_others
+
+    @property
+    def has_others(self) -> bool:
+        """Whether there are contacts of what is no target: clutter or false alarms."""
         alarms = any(one.sensor.false_alarms_per_km2 for one in self.vehicles.values())
         return alarms or self.targets.clutter_per_km2 is not None
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from planner.contacts import OTHERS_UP_TO
 from secondlook.scenario.model import Scenario, UniformSeabed
 from secondlook.scenario.sensor import SensorBase
 
 
 def at_odds(scenario: Scenario) -> str:
     """In a sentence what of a scenario's world its fleet does not know; empty where it is right about all of it."""
-    told = [*_targets(scenario), *_estimates(scenario), *_places(scenario)]
+    told = [*_targets(scenario), *_estimates(scenario), *_scores(scenario), *_places(scenario)]
     return f"the fleet is wrong on purpose: {'; '.join(told)}" if told else ""
 
 
@@ -42,6 +43,13 @@ def _errs(sensor: SensorBase, scenario: Scenario) -> bool:
     drawn = estimate.drift_per_km or (estimate.noise_along_m is not None and sensor.noise_cell)
     blind = estimate.blind_to_seabed and sensor.seabed_share != 0.0 and not isinstance(scenario.seabed, UniformSeabed)
     return bool(estimate.bias or estimate.bias_at_reach or estimate.bias_after_turn or drawn or blind)
+
+
+def _scores(scenario: Scenario) -> Iterator[str]:
+    wrong = [name for name, one in scenario.vehicles.items() if one.sensor.others_up_to is not None]
+    if wrong and scenario.has_others:
+        told = ", ".join(f"{scenario.vehicles[name].sensor.others_up_to:g} of {name}" for name in wrong)
+        yield f"what is no target scores up to {told}, and it takes that for {OTHERS_UP_TO:g}"
 
 
 def _places(scenario: Scenario) -> Iterator[str]:

@@ -18,6 +18,7 @@ from pydantic import (
 )
 
 from comms.errors import NO_FAILURES, in_words
+from planner.contacts import OTHERS_UP_TO
 from planner.types import DetectionCurve, SonarShape
 from secondlook.scenario import bundled
 from secondlook.scenario.plug_ins import CURVE, SONAR, PlugInError
@@ -168,6 +169,11 @@ class SensorBase(Mapping):
         Field(default=None, json_schema_extra={"default": 0})
     )
     """How many contacts of nothing it reports a square kilometre that it sees."""
+    others_up_to: Annotated[
+        float | None, Field(ge=0.5, le=1), AfterValidator(lambda one: None if one == OTHERS_UP_TO else one)
+    ] = Field(default=None, json_schema_extra={"default": OTHERS_UP_TO})
+    """How high its recogniser scores what is no target, in truth: at most that, and less mostly (that times a beta
+    distribution of 2 and 3). Targets score 0.5 to 1. The fleet takes it for 0.75, whatever it is."""
     along_bin_m: Bin = 5.0
     """Bin of a look along the track, in whole centimetres."""
     range_bin_m: Bin = 1.0

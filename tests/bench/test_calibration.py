@@ -57,6 +57,27 @@ def test_of_a_scenario_it_is_drawn_which_share_was_missed(tmp_path: Path, capsys
     assert "targets.count: -1 is not allowed" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--diagram", "d.png", "--missions", "0", "tellaro"], "--missions: 0 is not allowed; must be at least 1\n"),
+        (
+            ["--diagram", "d.xyz", "tellaro"],
+            "--diagram: d.xyz is not allowed; must end in .png, in a folder that is there\n",
+        ),
+        (
+            ["--diagram", "no/d.png", "tellaro"],
+            "--diagram: no/d.png is not allowed; must end in .png, in a folder that is there\n",
+        ),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused_before_anything_is_flown(
+    arguments: list[str], told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(arguments) == 2
+    assert capsys.readouterr().err == told
+
+
 def test_of_goals_it_is_told_how_often_they_are_reached_and_are_so() -> None:
     goal: dict[str, Any] = {
         "failure": None,

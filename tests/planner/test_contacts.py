@@ -198,7 +198,8 @@ def test_a_ratio_is_that_of_the_densities_of_mines_and_of_false_alarms() -> None
     assert likelihood_ratio(0.6) == pytest.approx(1.92 / 0.512)
     assert likelihood_ratio(0.3) == 0.0
     assert likelihood_ratio(0.8) == math.inf
-    assert likelihood_ratio(0.0) == likelihood_ratio(1.0) == 0.0
+    assert likelihood_ratio(0.0) == 0.0
+    assert likelihood_ratio(1.0) == math.inf  # who is surest of a mine has it taken for one
     # Mines score above 0.5, false alarms below 0.75.
     assert likelihood_ratio(0.5) == 0.0
     assert likelihood_ratio(0.75) == math.inf

@@ -116,6 +116,17 @@ def test_false_alarms_are_as_many_as_asked_for_within_the_swath_and_score_lower(
     assert all(0.0 <= contact.score < 0.75 for contact in contacts)
 
 
+def test_what_is_no_target_scores_as_high_as_told() -> None:
+    recogniser = Recogniser(CURVE, false_alarms_per_km2=1000.0, others_up_to=1.0)
+    look = SideSwath.over(SHAPE, (0.0, 0.0), 0.5, 40.0, 4, (5.0, 5.0))
+    generator = np.random.default_rng(4)
+    alarms = [one.score for _ in range(2000) for one in recogniser.false_alarms(look, generator)]
+    _, clutter = recogniser.detect(passed(9000), np.ones(9000), generator, clutter=True)
+    for scores in (alarms, [one.score for one in clutter]):
+        assert np.mean(scores) == pytest.approx(0.4, abs=0.01)
+        assert 0.9 < max(scores) < 1.0
+
+
 def test_no_false_alarms_unless_asked_for() -> None:
     assert not Recogniser(CURVE, false_alarms_per_km2=0.0).raises_false_alarms
 

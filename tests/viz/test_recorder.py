@@ -27,7 +27,6 @@ from comms.node import Received
 from comms.said.announcement import Hole, RunInfo, Vertex
 from comms.said.messages import (
     AgentState,
-    Contact,
     CoverageTile,
     Curve,
     Hotspot,
@@ -291,7 +290,7 @@ def test_mines_are_those_that_contacts_and_map_tell(messages: list[Received], re
         for name in ("found", "left", "left_low", "left_high")
     }
     times_ms = [time_ms for time_ms, _ in drawn["found"]]
-    first_ms, last_ms = of(messages, Contact)[0][0], messages[-1].header.sent_ms
+    first_ms, last_ms = of(messages, CoverageTile)[0][0], messages[-1].header.sent_ms
     assert times_ms == [*range(first_ms - first_ms % 120_000 + 120_000, last_ms, 120_000), last_ms]
     for at_ms, until_ms in ((times_ms[3], times_ms[3] - 1), (last_ms, last_ms)):
         told = Metrics()

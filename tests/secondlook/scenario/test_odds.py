@@ -54,6 +54,11 @@ def odds(*overrides: str) -> str:
             ["vehicles.primary.position_error_m=10", "vehicles.helper.position_drift_m_per_h=3"],
             "it takes the positions that primary, helper tell for true, and they are off",
         ),
+        (["vehicles.primary.sensor.others_up_to=0.9"], ""),
+        (
+            ["vehicles.primary.sensor.others_up_to=0.9", "vehicles.helper.sensor.false_alarms_per_km2=9"],
+            "what is no target scores up to 0.9 of primary, and it takes that for 0.75",
+        ),
         (
             ["targets.kinds=mines", "mission.rho=1"],
             "targets.correlation is 0, mission.rho 1; targets are mines, and it takes them for alike",
@@ -79,6 +84,7 @@ def test_it_is_told_before_the_mission_is_flown() -> None:
         "vehicles.primary.sensor.estimate={}",
         "vehicles.primary.sensor.estimate={bias: 0, blind_to_seabed: false}",
         "vehicles.primary.sensor.false_alarms_per_km2=0",
+        "vehicles.primary.sensor.others_up_to=0.75",
     ],
 )
 def test_what_is_the_default_makes_the_same_scenario(override: str) -> None:
