@@ -17,7 +17,7 @@ from functools import lru_cache
 import numpy as np
 import shapely
 
-from planner.dubins import DubinsPath, Pose, path_lengths_m, shortest_path
+from planner.dubins import TIE_M, DubinsPath, Pose, path_lengths_m, shortest_path
 from planner.keep_out import KeepOut
 from planner.types import BoolArray, FloatArray, Point
 
@@ -134,7 +134,10 @@ class _Graph:
             heapq.heappush(queue, (done_m + left_m, done_m, line, before))
 
         for number in range(out.start.size):
-            push((0, number), None, _turned(first_rad, float(out.heading[number]), int(out.start[number])), 0.0)
+            leaves = int(out.start[number])
+            # Of two ways equally long the one that first turns to port is taken, as where nothing is in the way.
+            handicap_m = TIE_M if leaves % 2 else 0.0
+            push((0, number), None, _turned(first_rad, float(out.heading[number]), leaves), handicap_m)
         while queue:
             _, done_m, line, before = heapq.heappop(queue)
             if line in came:

@@ -252,6 +252,18 @@ def test_out_of_one_gap_into_another_it_goes_straight_on_as_far_as_each_takes() 
     assert_keeps_radius(poses, RADIUS_M, 0.1)
 
 
+@pytest.mark.parametrize("turned_rad", [0.0, 1e-6, -1e-6, 1e-4, -1e-4])
+def test_of_two_ways_equally_long_that_to_port_is_taken(turned_rad: float) -> None:
+    """What is told of a heading is rounded: all who reckon a way must take the same one. A full turn and 89 m it is to
+    either side, as a zone lies in the shorter way."""
+    zone = KeepOut((((197.38, -4.77), (228.95, -4.77), (228.95, 47.17)),), 1.5)
+    start, end = Pose(248.95, 64.0, EAST + turned_rad), Pose(208.95, -15.55, EAST)
+    assert not zone.is_clear([shortest_path(start, end, 19.73)])
+    (way,) = shortest_way(start, end, 19.73, zone) or ()
+    assert way.turns == (-1, 0, -1)
+    assert way.length_m == pytest.approx(2 * math.pi * 19.73 + math.dist(start[:2], end[:2]), abs=0.005)
+
+
 class TestNoWay:
     RING = KeepOut(
         (
