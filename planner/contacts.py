@@ -19,7 +19,7 @@ from itertools import product
 import numpy as np
 
 from planner.fleet_map import FleetMap
-from planner.registration import MOST_APART_M, REACH_SIGMAS, Frame, registered
+from planner.registration import AS_TOLD, MOST_APART_M, REACH_SIGMAS, Frame, registered
 from planner.types import BoolArray, FloatArray
 
 LEAST_GATE_M = 2.0
@@ -103,7 +103,8 @@ class _Object:
 
 
 class _Joined:
-    """Objects by squares of PLACE_M, as contacts are joined to them one by one; vehicles' places lie in `frames`."""
+    """Objects by squares of PLACE_M, as contacts are joined to them one by one. `frames`: of vehicles that do not tell
+    places as the reference does."""
 
     def __init__(self, frames: Mapping[str, Frame]) -> None:
         self.frames = frames
@@ -120,7 +121,7 @@ class _Joined:
         return np.array([(one.x_m, one.y_m, one.sigma_m) for one in of], dtype=np.float64).reshape(-1, 3)
 
     def join(self, sighting: Sighting) -> None:
-        frame = self.frames[sighting.vehicle]
+        frame = self.frames.get(sighting.vehicle, AS_TOLD)
         x_m, y_m = sighting.x_m - frame.east_m, sighting.y_m - frame.north_m
         found = self._nearest(sighting, frame, x_m, y_m)
         if found is None:
@@ -150,7 +151,8 @@ class _Joined:
                 spot = one.spots.get(sighting.vehicle)
                 if spot is None:
                     away_m = math.hypot(one.x_m - x_m, one.y_m - y_m)
-                    gate_m = _gate_m(math.hypot(frame.sigma_m, min(self.frames[name].sigma_m for name in one.spots)))
+                    sigma_m = min(self.frames.get(name, AS_TOLD).sigma_m for name in one.spots)
+                    gate_m = _gate_m(math.hypot(frame.sigma_m, sigma_m))
                 else:
                     away_m = math.hypot(spot.x_m - sighting.x_m, spot.y_m - sighting.y_m)
                     gate_m = _gate_m(sighting.sigma_m - spot.sigma_m)
@@ -165,7 +167,10 @@ class Objects:
     def __init__(self) -> None:
         self._heard: set[Hashable] = set()
         self._sightings: list[Sighting] = []
+        self._is_off = False
+        """Whether a vehicle is not sure where it is."""
         self._alone: dict[str, _Joined] = {}
+        self._joined_alone = 0
         self._together = _Joined({})
         self._joined = 0
 
@@ -176,13 +181,12 @@ class Objects:
             return False
         self._heard.add(number)
         self._sightings.append(sighting)
-        name = sighting.vehicle
-        self._alone.setdefault(name, _Joined({name: Frame()})).join(sighting)
+        self._is_off |= sighting.sigma_m > 0.0
         return True
 
     def seen(self) -> SeenObjects:
         """All of them, by place."""
-        frames = registered({name: joined.spots(name) for name, joined in self._alone.items()})
+        frames = self._registered() if self._is_off else {}
         if frames != self._together.frames:  # what is known of how far they are off has changed: all are joined anew
             self._together, self._joined = _Joined(frames), 0
         for sighting in self._sightings[self._joined :]:
@@ -198,6 +202,13 @@ class Objects:
             along=np.array([one.along for one in some], dtype=np.bool_),
             across=np.array([one.across for one in some], dtype=np.bool_),
         )
+
+    def _registered(self) -> dict[str, Frame]:
+        """By what each vehicle has seen, as it has it alone."""
+        for sighting in self._sightings[self._joined_alone :]:
+            self._alone.setdefault(sighting.vehicle, _Joined({})).join(sighting)
+        self._joined_alone = len(self._sightings)
+        return registered({name: joined.spots(name) for name, joined in self._alone.items()})
 
 
 @dataclass(frozen=True, eq=False)

@@ -43,6 +43,10 @@ class Frame:
     placed_m: float = math.inf
 
 
+AS_TOLD = Frame()
+"""Of the reference, and of all that are where they believe."""
+
+
 def registered(seen: Mapping[str, FloatArray]) -> dict[str, Frame]:
     """The frame of each vehicle by what each has `seen`: east, north and the standard deviation that it told of its
     place, for each thing it has seen; arrays of shape (>= 1, 3), in metres.
@@ -56,9 +60,9 @@ def registered(seen: Mapping[str, FloatArray]) -> dict[str, Frame]:
     for name in order:
         places, sigma_m = seen[name], float(seen[name][:, 2].mean())
         if not frames:
-            frames[name], reference_m = Frame(), sigma_m
+            frames[name], reference_m = AS_TOLD, sigma_m
         elif sigma_m == 0.0:  # nor is any before it off
-            frames[name] = Frame()
+            frames[name] = AS_TOLD
         else:
             known = np.concatenate(pool)
             prior_m = math.hypot(sigma_m, reference_m)

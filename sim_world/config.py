@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 
 from comms.said.wire import IDENTIFIER
+from planner.contacts import OTHERS_UP_TO
 from planner.currents import FlowGrid
 from planner.keep_out import NOWHERE, KeepOut
 from planner.types import DetectionCurve, Point, SonarShape
@@ -129,7 +130,7 @@ class SensorConfig:
     half_at_crab_rad: float | None = None
     estimate: EstimateConfig = field(default_factory=EstimateConfig)
     false_alarms_per_km2: float = 0.0
-    others_up_to: float = 0.75
+    others_up_to: float = OTHERS_UP_TO
 
     def __post_init__(self) -> None:
         ranges, values = self.curve.range_m, self.curve.p_detect

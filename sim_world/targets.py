@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from comms.node import random_stream
 from comms.said.messages import LookContact, TruthTarget, TruthTargets
+from planner.contacts import OTHERS_UP_TO
 from planner.types import BoolArray, DetectionCurve, FloatArray, Point
 from sim_world.area import Ground
 from sim_world.config import TargetsConfig
@@ -101,7 +102,9 @@ class Recogniser:
     between the ranges at which `curve` rises above 0. `others_up_to`: how high what is no target scores at most.
     """
 
-    def __init__(self, curve: DetectionCurve, *, false_alarms_per_km2: float, others_up_to: float = 0.75) -> None:
+    def __init__(
+        self, curve: DetectionCurve, *, false_alarms_per_km2: float, others_up_to: float = OTHERS_UP_TO
+    ) -> None:
         self._others_up_to = others_up_to
         self.raises_false_alarms = false_alarms_per_km2 > 0.0
         self._false_alarms_per_m2 = false_alarms_per_km2 / M2_PER_KM2

@@ -35,6 +35,13 @@ def test_of_100_that_are_found_25_may_be_left_for_a_clearance_of_80_percent() ->
     assert goal.words == "a clearance of 0.8 with a chance of 0.9"
 
 
+@pytest.mark.parametrize("last_bits", [-1e-13, 0.0, 1e-13])
+def test_the_last_bits_of_a_chance_decide_nothing(last_bits: float) -> None:
+    left = MinesLeft(10.0, 0.1, 0, 1, 0.9, 0.99, np.array([0.9 + last_bits, 1.0]))
+    assert Goal(1.0, 0.9).is_reached(left)
+    assert not Goal(1.0, 0.900001).is_reached(left)
+
+
 def test_none_is_left_with_the_chance_of_0() -> None:
     left = left_of(0.001, 10.0)
     goal = Goal(1.0, 0.95)
