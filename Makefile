@@ -15,7 +15,7 @@ BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 INSTALL_PROJECT := $(PIP) install --quiet --no-deps --no-build-isolation --editable .
 
-.PHONY: run test docs docs-figures example pictures golden mutants lock release clean
+.PHONY: run test docs docs-figures example pictures processors golden mutants lock release clean
 .DELETE_ON_ERROR:
 
 run: .venv/.run-ready
@@ -48,6 +48,10 @@ docs: .venv/.test-ready
 # The tables of the docs that missions are flown for, all of them anew: some three hours on two cores.
 docs-figures: .venv/.test-ready
 	@$(BIN)/python -m bench.figures --fly all
+
+# Whole missions, with what numpy makes of this processor and without: ten minutes on two cores.
+processors: .venv/.test-ready
+	@$(BIN)/python -m bench.processors
 
 # The recorded mission that every node has to say again, and the steps that missions take, anew: after a change that is
 # meant to change what nodes say.

@@ -38,16 +38,10 @@ CONTACT_COLUMNS = (
     Column("of these listed", itemgetter("truth.listed_share"), 2),
     Column("listed falsely, a km²", itemgetter("truth.false_listed_per_km2"), 2),
 )
-LEFT_FIGURES = (*MISSION, "truth.targets", "truth.missed_share", "mines.left", "mines.left_low", "mines.left_high")
+LEFT_FIGURES = (*MISSION, "truth.targets", "truth.left", "mines.left", "mines.left_low", "mines.left_high")
 GOAL_FIGURES = (*MISSION, "time.mission_s", "goal.reached", "goal.true")
 CONTACT_FIGURES = (*MISSION, "truth.missed_share", "truth.listed_share", "truth.false_listed_per_km2")
 """What the tables are made of."""
-
-
-def left_of(row: Row) -> int:
-    """How many targets nobody found."""
-    left: int = round(row["truth.targets"] * row["truth.missed_share"])
-    return left
 
 
 def share_interval(held: int, of: int) -> tuple[float, float]:
@@ -71,9 +65,9 @@ class Held:
     @classmethod
     def of(cls, missions: Sequence[Row]) -> Held:
         """Of these, at least one."""
-        more = sum(left_of(row) > row["mines.left_high"] for row in missions)
-        fewer = sum(left_of(row) < row["mines.left_low"] for row in missions)
-        left, told = fmean(map(left_of, missions)), fmean(row["mines.left"] for row in missions)
+        more = sum(row["truth.left"] > row["mines.left_high"] for row in missions)
+        fewer = sum(row["truth.left"] < row["mines.left_low"] for row in missions)
+        left, told = (fmean(row[name] for row in missions) for name in ("truth.left", "mines.left"))
         return cls(len(missions), left, told, more, fewer)
 
     def figures(self) -> list[str]:

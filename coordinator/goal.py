@@ -45,6 +45,5 @@ class GoalWatch:
         self._agenda.add(Item.GOAL, now_ms + LOOK_EVERY_MS)
         curves = [[curve for track, curve in one.curves.items() if track > 0] for one in self._fleet.vehicles.values()]
         scatter = scatter_of_all(one for one in curves if one)
-        found = self._contacts.mines
-        left = mines_left_by(self._fleet.map, self._inside, found, scatter, self._place, CAUTIOUS_MINES)
+        left = mines_left_by(self._contacts.objects, self._inside, scatter, self._place, CAUTIOUS_MINES)
         return f"{goal.words}; {goal.words_now(left)}" if goal.is_reached(left) else ""

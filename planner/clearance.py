@@ -5,6 +5,10 @@ residual risk. Those found then tell of the density, and the density and the map
 number left follows a negative binomial distribution. (Washburn, Search and Detection, and the chapter on mine
 clearance in Washburn and Kress, Combat Modeling; the gamma-Poisson pair is that of any Bayesian textbook.)
 
+A mine is found if it is on the list of mines. What was detected and is not listed, as it is more likely something else,
+may be a mine all the same: each adds its chance to those left (the number of them follows a Poisson binomial
+distribution), and all that was detected tells of the density.
+
 That P(y) is known by few tracks alone makes the answer wider: all that looks have seen is taken for so much more or
 less of it as the tracks differ from each other.
 """
@@ -17,7 +21,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from planner.fleet_map import EVERYWHERE, FleetMap
+from planner.contacts import ObjectsOnMap, are_listed
+from planner.fleet_map import EVERYWHERE
 from planner.types import BoolArray, DetectionCurve, FloatArray
 
 PRIOR_MINES = 0.5
@@ -30,13 +35,15 @@ UNKNOWN_SCATTER = 0.3
 NODES = 9
 MOST_MINES = 100_000
 LOW, HIGH = 0.05, 0.95
+NOTHING = np.zeros(0)
 
 
 @dataclass(frozen=True)
 class MinesLeft:
     """How many mines are left somewhere: the `mean`, the 90 % interval from `low` to `high`, and the chance that there
-    is `none`. `found`: those that were found there or elsewhere and told of the density; `clearance`: the share of all
-    mines there that is expected to have been found, [0, 1]. `reached`: the chances of at most 0, 1, 2 and so on."""
+    is `none`. `found`: how many are expected to be mines of all that is listed as one, there or elsewhere; `clearance`:
+    the share of all mines there that is expected to have been found, [0, 1]. `reached`: the chances of at most 0, 1, 2
+    and so on."""
 
     found: float
     mean: float
@@ -64,13 +71,16 @@ def mines_left(
     scatter: float,
     weights: FloatArray | float = 1.0,
     prior_mines: float = PRIOR_MINES,
+    unlisted: FloatArray = NOTHING,
+    there: FloatArray | float = 1.0,
 ) -> MinesLeft | None:
     """The mines left in the cells of `place`, given how many were `found` in those that were `searched`; None where
     nothing was seen, and nothing can be said.
 
     `risk`: residual risk by cell, in [0, 1]. `scatter`: relative standard deviation of what looks are taken to have
     seen, see `scatter_of`. `weights`: how much denser mines lie in some cells than in others. `prior_mines`: see
-    PRIOR_MINES.
+    PRIOR_MINES. `unlisted`: the chance to be a mine, in [0, 1], of each object that was detected and does not count as
+    found, shape (objects,); `there`: how much of each lies in the place, [0, 1].
 
     Raises ValueError for a number found, or a scatter, that is negative or not finite.
     """
@@ -79,6 +89,7 @@ def mines_left(
     nodes, shares = np.polynomial.hermite_e.hermegauss(NODES)
     chances, means, cleared, kept = np.zeros(1), 0.0, 0.0, 0.0
     shares = shares / shares.sum()
+    shape, unlisted_there = found + float(unlisted.sum()) + prior_mines, unlisted * there
     area = np.broadcast_to(np.asarray(weights, dtype=np.float64) * cell_area_m2, risk.shape)
     for node, share in zip(nodes.tolist(), shares.tolist(), strict=True):
         missed = risk ** max(0.0, 1.0 + scatter * node)
@@ -89,16 +100,19 @@ def mines_left(
                 return None
             continue
         kept += share
-        expected = (found + prior_mines) * left_m2 / seen_m2
-        chances = _sum(chances, share * _negative_binomial(found + prior_mines, expected))
+        expected = shape * left_m2 / seen_m2
+        chances = _sum(chances, share * _negative_binomial(shape, expected))
         means += share * expected
-        within = float(((1.0 - missed) * area)[place].sum())
-        cleared += share * (within / (within + left_m2) if within + left_m2 > 0.0 else 1.0)
+        detected = shape * float(((1.0 - missed) * area)[place].sum()) / seen_m2
+        all_there = detected + expected
+        cleared += share * (max(0.0, detected - float(unlisted_there.sum())) / all_there if all_there > 0.0 else 1.0)
+    for chance in unlisted_there.tolist():
+        chances = np.append(chances * (1.0 - chance), 0.0) + np.append(0.0, chances * chance)
     total = float(chances.sum())
     reached = chances.cumsum() / total
     return MinesLeft(
         found=found,
-        mean=means / kept,
+        mean=means / kept + float(unlisted_there.sum()),
         low=int(np.searchsorted(reached, LOW)),
         high=int(np.searchsorted(reached, HIGH)),
         none=float(chances[0]) / total,
@@ -108,15 +122,25 @@ def mines_left(
 
 
 def mines_left_by(
-    map_: FleetMap,
+    objects: ObjectsOnMap,
     inside: BoolArray,
-    found: float,
     scatter: float,
     place: FloatArray | None = None,
     prior_mines: float = PRIOR_MINES,
 ) -> MinesLeft | None:
-    """The same by a fleet's map, of the area's cells, `inside`, or of a `place`, so much of each cell, 0 or more; from
-    the number of cells that have each level, as there are few levels and many cells."""
+    """The same by what a fleet has detected and by its map, of the area's cells, `inside`, or of a `place`, so much of
+    each cell, 0 or more; from the number of cells that have each level, as there are few levels and many cells. An
+    object lies in a place by as much as its cell does. None where there is no map yet."""
+    map_ = objects.map
+    if map_ is None:
+        return None
+    seen, chances = objects.known()
+    mines, there = chances[:, 0], np.ones(seen.x_m.shape)
+    is_listed = are_listed(mines)
+    if place is not None:
+        rows, columns = map_.grid.cells_of(seen.x_m, seen.y_m)
+        there = place[np.clip(rows, 0, map_.grid.rows - 1), np.clip(columns, 0, map_.grid.columns - 1)]
+        there = np.minimum(there, 1.0)
     levels, risk = map_.levels_within(EVERYWHERE, map_.layers)
     weights = np.bincount(levels[inside], minlength=risk.size).astype(np.float64)
     searched = in_place = np.ones(risk.size, dtype=np.bool_)
@@ -125,7 +149,10 @@ def mines_left_by(
         weights = np.concatenate([weights, np.bincount(levels[some], place[some], minlength=risk.size)])
         risk, searched = np.tile(risk, 2), np.repeat([True, False], risk.size)
         in_place = ~searched
-    return mines_left(risk, searched, in_place, map_.grid.cell_area_m2, found, scatter, weights, prior_mines)
+    return mines_left(
+        *(risk, searched, in_place, map_.grid.cell_area_m2, float(mines[is_listed].sum()), scatter),
+        *(weights, prior_mines, mines[~is_listed], there[~is_listed]),
+    )
 
 
 def scatter_of_all(vehicles: Iterable[Sequence[DetectionCurve]]) -> float:

@@ -6,7 +6,8 @@ new one. An object is a mine; or clutter, which lies there as well and is seen a
 nothing at all, an alarm that is not raised again. Its chances of these follow by Bayes' rule from the scores of its
 contacts, and from how often it was seen, beside how often one would be that lies there: scores of mines and of the
 others are distributed as the recogniser's maker tells, and the shares of the three among all objects are those under
-which all this together is likeliest (found by expectation maximisation).
+which all this together is likeliest (found by expectation maximisation), with one object more of each kind than was
+heard of: few contacts do not tell for sure that there is nothing but mines (a Dirichlet prior of one each).
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ import numpy as np
 
 from planner.fleet_map import FleetMap
 from planner.registration import AS_TOLD, MOST_APART_M, REACH_SIGMAS, Frame, registered
+from planner.rounding import rounded
 from planner.types import BoolArray, FloatArray
 
 LEAST_GATE_M = 2.0
@@ -249,7 +251,7 @@ class SeenObjects:
         for _ in range(ROUNDS):
             weighed = likely * shares
             found = weighed / weighed.sum(axis=1, keepdims=True)
-            shares = np.maximum(found.mean(axis=0), LEAST_SHARE)
+            shares = (found.sum(axis=0) + 1.0) / (len(found) + 3.0)
         return found
 
 
@@ -280,6 +282,11 @@ class ObjectsOnMap:
     def mines(self) -> float:
         """How many of them are expected to be mines."""
         return float(self.known()[1][:, 0].sum())
+
+
+def are_listed(mine_chances: FloatArray) -> BoolArray:
+    """Which objects are listed as mines, by the chance that each is one; shape (objects,)."""
+    return rounded(mine_chances) >= LISTED_FROM
 
 
 def surer_by(chances: FloatArray, nats: FloatArray | float) -> FloatArray:

@@ -27,6 +27,7 @@ COMMANDS = {
     "replay": "replay:replay",
     "view": "view:view",
     "report": "report:report",
+    "mines": "mines:mines",
     "geojson": "export:geojson",
     "export": "export:export",
     "picture": "picture:picture",

@@ -48,7 +48,13 @@ WEDGE = Kind(1.0, 0.8, 0.3)
 """Assumed, and taken for a box."""
 
 ALIKE = "alike"
-MIXTURES: dict[str, tuple[Kind, ...]] = {ALIKE: (), "mines": (CYLINDER, TRUNCATED_CONE, WEDGE)}
+MIXTURES: dict[str, tuple[Kind, ...]] = {
+    ALIKE: (),
+    "mines": (CYLINDER, TRUNCATED_CONE, WEDGE),
+    "cylinders": (CYLINDER,),
+    "truncated_cones": (TRUNCATED_CONE,),
+    "wedges": (WEDGE,),
+}
 """By its name what a mixture holds, each kind as often; `alike` has none: all targets are seen as P_d says."""
 
 

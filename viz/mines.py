@@ -27,7 +27,7 @@ class Mines:
     `inside`, tell then; nothing before a first look."""
 
     def __init__(self, canvas: Canvas, map_: FleetMap, inside: BoolArray) -> None:
-        self._canvas, self._map, self._inside = canvas, map_, inside
+        self._canvas, self._inside = canvas, inside
         self._objects = ObjectsOnMap(map_)
         self._curves: dict[str, dict[int, DetectionCurve]] = {}
         self._due_ms = DRAW_EVERY_MS
@@ -56,9 +56,8 @@ class Mines:
         self._draw(time_ms)
 
     def _draw(self, time_ms: int) -> None:
-        found = self._objects.mines
         scatter = scatter_of_all(list(one.values()) for one in self._curves.values())
-        left = mines_left_by(self._map, self._inside, found, scatter)
+        left = mines_left_by(self._objects, self._inside, scatter)
         if left is not None:
-            for path, value in zip(SERIES, (found, left.mean, left.low, left.high), strict=True):
+            for path, value in zip(SERIES, (left.found, left.mean, left.low, left.high), strict=True):
                 self._canvas.put(time_ms, path, rr.Scalars(float(value)))

@@ -31,22 +31,17 @@ class KnownContacts:
     def __init__(self, fleet: KnownFleet, inside: BoolArray) -> None:
         self._fleet = fleet
         self._inside = inside
-        self._objects = ObjectsOnMap(fleet.map)
+        self.objects = ObjectsOnMap(fleet.map)
 
     def hear(self, received: Received, contact: Contact, *, across: bool) -> None:
         """Joins a contact. `across`: it was seen from a strip across the tracks."""
         number = received.vehicle, received.header.incarnation, received.number
         place = contact.x_m, contact.y_m, contact.sigma_m
-        self._objects.hear(Sighting(received.vehicle, *place, contact.score, across), number)
-
-    @property
-    def mines(self) -> float:
-        """How many of the objects are expected to be mines."""
-        return self._objects.mines
+        self.objects.hear(Sighting(received.vehicle, *place, contact.score, across), number)
 
     def doubtful(self, window: Window) -> int:
         """How many objects lie in a window of the map of which nobody can tell whether they are mines."""
-        seen, chances = self._objects.known()
+        seen, chances = self.objects.known()
         rows, columns = self._fleet.map.grid.cells_of(seen.x_m, seen.y_m)
         there = (rows >= window.first_row) & (rows < window.end_row)
         there &= (columns >= window.first_column) & (columns < window.end_column)
@@ -61,7 +56,7 @@ class KnownContacts:
         before count less, as far as the map takes looks for alike (rho).
         """
         grid, map_ = self._fleet.map.grid, self._fleet.map
-        seen, chances = self._objects.known()
+        seen, chances = self.objects.known()
         rows, columns = grid.cells_of(seen.x_m, seen.y_m)
         rows, columns = rows - window.first_row, columns - window.first_column
         shape = look.shape
@@ -71,7 +66,7 @@ class KnownContacts:
         seen_m2 = float((1.0 - map_.risk)[self._inside].sum()) * grid.cell_area_m2
         if seen_m2 <= 0.0:
             return None
-        density_m2 = (self.mines + PRIOR_MINES) / seen_m2
+        density_m2 = (self.objects.mines + PRIOR_MINES) / seen_m2
         rows, columns, of_those = rows[here], columns[here], np.flatnonzero(here)
         nats = -np.log1p(-np.minimum(look[rows, columns], 1.0 - 1e-9))
         counts = rounded(surer_by(chances[here], nats) / density_m2)

@@ -23,6 +23,7 @@ def check(
     set_: Annotated[
         list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Override a key of the scenario.")
     ] = None,
+    no_trial: Annotated[bool, typer.Option("--no-trial", help="Do not fly a goal.")] = False,
 ) -> None:
     """Validate a scenario. Tells all that is wrong with it by line, or how its area will be surveyed, what the mission
     is expected to come to, who can do nothing in it, and what cannot be reached past ground to keep out of. One that
@@ -40,7 +41,7 @@ def check(
     expected = expected_of(valid)
     tell_expected(expected)
     refuse(expected)
-    if valid.mission.goal is None:
+    if valid.mission.goal is None or no_trial:
         return
     with shown_progress("trying the goal", "of the missions flown") as tell:
         estimate = goal_estimate(valid, lambda share: tell(share, no_remark))

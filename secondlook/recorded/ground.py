@@ -17,7 +17,7 @@ from shapely.geometry.base import BaseGeometry
 
 from comms.node import Received
 from comms.said.messages import Contact, TruthLook, TruthTargets
-from planner.contacts import LISTED_FROM, SeenObjects
+from planner.contacts import SeenObjects, are_listed
 from planner.risk import RiskStatistics, risk_statistics
 from planner.types import BoolArray, FloatArray, GridSpec, PriorityGround
 from secondlook.errors import UserError
@@ -213,11 +213,12 @@ class ObjectRecord:
 def objects(seen: SeenObjects, chances: FloatArray) -> list[ObjectRecord]:
     """All of them, those first that are mines most likely. `chances`: that each is a mine."""
     found = [
-        ObjectRecord(round(contacts), sigma_m, chance, chance >= LISTED_FROM, shapely.Point(x_m, y_m))
-        for contacts, sigma_m, chance, x_m, y_m in zip(
+        ObjectRecord(round(contacts), sigma_m, chance, listed, shapely.Point(x_m, y_m))
+        for contacts, sigma_m, chance, listed, x_m, y_m in zip(
             seen.contacts.tolist(),
             seen.sigma_m.tolist(),
             chances.tolist(),
+            are_listed(chances).tolist(),
             seen.x_m.tolist(),
             seen.y_m.tolist(),
             strict=True,

@@ -33,7 +33,7 @@ from comms.said.messages import (
 )
 from comms.strip_books import StripBooks
 from planner.clearance import PRIOR_MINES, MinesLeft, mines_left_by, scatter_of_all
-from planner.contacts import LISTED_FROM, ObjectsOnMap, SeenObjects, Sighting
+from planner.contacts import ObjectsOnMap, SeenObjects, Sighting, are_listed
 from planner.fleet_map import FleetMap, VehicleLayer
 from planner.footprints import footprint_of
 from planner.footprints.footprint import Footprint
@@ -214,15 +214,30 @@ class Metrics:
         return self.map.risk[self._target_cells(self.map.grid)], missed
 
     def truly_found(self, within: BaseGeometry | None = None) -> float | None:
-        """The share of the targets that somebody has detected, of all or of those that lie in a geometry (mission
-        frame) or on its border, 1 where none does; None in a world without targets."""
-        _, missed = self.targets_met()
-        if self.targets is None or not missed.size:
+        """The share of the targets that are found, see `targets_found`, of all or of those that lie in a geometry
+        (mission frame) or on its border, 1 where none does; None in a world without targets."""
+        found = self.targets_found()
+        if self.targets is None or not found.size:
             return None
         if within is not None:
             x_m, y_m = np.array([(one.x_m, one.y_m) for one in self.targets.targets]).T
-            missed = missed[shapely.intersects_xy(within, x_m, y_m)]
-        return float((~missed).mean()) if missed.size else 1.0  # as 1 - 0.07 is a little less than 0.93
+            found = found[shapely.intersects_xy(within, x_m, y_m)]
+        return float(found.mean()) if found.size else 1.0
+
+    def targets_found(self) -> BoolArray:
+        """Whether each target is found: somebody has detected it, and what is listed as a mine lies within reach of it;
+        shape (targets,)."""
+        _, missed = self.targets_met()
+        return np.asarray(~missed & self._listed_at_targets().any(axis=0)) if missed.size else missed
+
+    def _listed_at_targets(self) -> BoolArray:
+        """Of everything listed as a mine which targets lie within reach; shape (listed, targets)."""
+        assert self.targets is not None
+        seen, chances = self.mine_chances()
+        listed = are_listed(chances)
+        x_m, y_m = np.array([(one.x_m, one.y_m) for one in self.targets.targets]).T
+        apart_m = np.hypot(seen.x_m[listed, np.newaxis] - x_m, seen.y_m[listed, np.newaxis] - y_m)
+        return np.asarray(apart_m <= seen.gate_m[listed, np.newaxis])
 
     def _target_cells(self, grid: GridSpec) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """The row and column of each target's cell."""
@@ -235,10 +250,8 @@ class Metrics:
     def mines_left(self, place: FloatArray | None = None, prior_mines: float = PRIOR_MINES) -> MinesLeft | None:
         """How many mines may be left in the area, or in so much of each cell, by the map and by what was found
         anywhere; None where nothing was seen. `prior_mines`: see `planner.clearance.PRIOR_MINES`."""
-        if self.map is None:
-            return None
         scatter = scatter_of_all(list(one.values()) for one in self.curves.values())
-        return mines_left_by(self.map, self.inside, self.objects.mines, scatter, place, prior_mines)
+        return mines_left_by(self.objects, self.inside, scatter, place, prior_mines)
 
     def mine_chances(self) -> tuple[SeenObjects, FloatArray]:
         """What contacts have told of, and with which chance each is a mine, shape (objects,)."""
@@ -354,7 +367,7 @@ class Metrics:
         chances = self.mine_chances()[1]
         return {
             "objects": chances.size,
-            "listed": int((chances >= LISTED_FROM).sum()),
+            "listed": int(are_listed(chances).sum()),
             "found": left.found,
             "left": left.mean,
             "left_low": left.low,
@@ -366,9 +379,10 @@ class Metrics:
     def _truth_summary(self) -> dict[str, Any]:
         risk, missed = self.targets_met()
         if not risk.size:
-            return {"targets": 0, "missed_share": None, "predicted_missed_share": None}
+            return {"targets": 0, "left": 0, "missed_share": None, "predicted_missed_share": None}
         return {
             "targets": risk.size,
+            "left": int((~self.targets_found()).sum()),
             "missed_share": float(missed.mean()),
             "predicted_missed_share": float(risk.mean()),
             **self._truth_of_list(missed),
@@ -378,15 +392,10 @@ class Metrics:
         """How right the list of mines is: the share of the targets that somebody has detected of which something
         listed lies within reach, and how much is listed that is no target, a square kilometre of the area."""
         assert self.map is not None
-        assert self.targets is not None
-        seen, chances = self.mine_chances()
-        listed = chances >= LISTED_FROM
-        x_m, y_m = np.array([(one.x_m, one.y_m) for one in self.targets.targets]).T
-        apart_m = np.hypot(seen.x_m[listed, np.newaxis] - x_m, seen.y_m[listed, np.newaxis] - y_m)
-        there = apart_m <= seen.gate_m[listed, np.newaxis]
+        there = self._listed_at_targets()
         area_km2 = float(self.inside.sum()) * self.map.grid.cell_area_m2 / 1e6
         return {
-            "listed_share": None if missed.all() else float(there.any(axis=0)[~missed].mean()),
+            "listed_share": None if missed.all() else float(np.asarray(there.any(axis=0))[~missed].mean()),
             "false_listed_per_km2": float((~there.any(axis=1)).sum()) / area_km2,
         }
 

@@ -25,7 +25,7 @@ def _targets(scenario: Scenario) -> Iterator[str]:
     if targets.aspect_deg is not None:
         yield f"from other aspects looks share less, {targets.aspect_deg:g} degrees apart nothing"
     if targets.kinds is not None:
-        yield f"targets are {targets.kinds}, and it takes them for alike"
+        yield f"targets are {targets.kinds.replace('_', ' ')}, and it takes them for alike"
     if targets.layout is not None:
         yield f"targets.layout is {targets.layout.kind}, and it takes them for spread at random"
 

@@ -96,10 +96,12 @@ class Targets(Mapping):
     """How far apart the bearings are along which two looks see a target where they share nothing any more; in between
     the evenly less, the farther apart. Left out, the bearing does not matter. With `correlation`."""
     kinds: Annotated[
-        Literal["alike", "mines"] | None, AfterValidator(lambda kinds: None if kinds == "alike" else kinds)
+        Literal["alike", "mines", "cylinders", "truncated_cones", "wedges"] | None,
+        AfterValidator(lambda kinds: None if kinds == "alike" else kinds),
     ] = Field(default=None, json_schema_extra={"default": "alike"})
     """`alike`: every target is seen as P_d says, which is what the map believes. `mines`: cylinders, truncated cones
-    and wedges, turned and buried as it happens; some are seen better than P_d says, others worse."""
+    and wedges, turned and buried as it happens; some are seen better than P_d says, others worse. `cylinders`,
+    `truncated_cones`, `wedges`: these alone."""
 
     clutter_per_km2: Annotated[float | None, Field(ge=0, le=1000), AfterValidator(lambda one: one or None)] = Field(
         default=None, json_schema_extra={"default": 0}

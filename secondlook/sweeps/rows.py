@@ -46,7 +46,7 @@ FIGURES: Mapping[str, Any] = {
     },
     "goal": {"reached": YES_NO, "chance": REAL, "true": YES_NO},
     "truth": {
-        "targets": WHOLE,
+        **dict.fromkeys(("targets", "left"), WHOLE),
         **dict.fromkeys(("missed_share", "predicted_missed_share", "listed_share", "false_listed_per_km2"), REAL),
     },
     "hotspots": {

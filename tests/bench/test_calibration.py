@@ -12,7 +12,7 @@ from bench.calibration import Held, contact_table, goal_table, main, share_inter
 
 
 def row(left: int, low: int, high: int, **varied: Any) -> dict[str, Any]:
-    truth = {"truth.targets": 200, "truth.missed_share": left / 200}
+    truth = {"truth.targets": 200, "truth.left": left}
     return {"failure": None, **truth, "mines.left": 60.0, "mines.left_low": low, "mines.left_high": high, **varied}
 
 
@@ -31,7 +31,7 @@ def test_of_many_missions_the_share_is_told_to_a_tenth_of_a_per_cent() -> None:
 
 
 def test_missions_without_targets_or_without_a_look_tell_nothing() -> None:
-    none = {**row(0, 0, 0), "truth.targets": 0, "truth.missed_share": None}
+    none = {**row(0, 0, 0), "truth.targets": 0}
     assert len(table([none, {**row(1, 0, 9), "mines.left": None}], [])) == 2
 
 

@@ -43,6 +43,7 @@ def test_a_mission_of_it_still_leaves_what_is_kept(name: str, tmp_path: Path) ->
 def test_what_is_declared_to_be_flown_is_what_is_kept() -> None:
     declared = {
         "clearance": Counter(dict.fromkeys(clearance_tables.CALIBRATED, 40)),
+        "few-mines": Counter(dict.fromkeys(clearance_tables.FEW, clearance_tables.FEW_MISSIONS)),
         "goals": Counter(dict(clearance_tables.GOALS)),
         "intervals": Counter(dict.fromkeys((case for case, _ in clearance_tables.MANY_TIMES), 1)),
         "reliability": Counter(

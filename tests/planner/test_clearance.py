@@ -22,6 +22,7 @@ from planner.clearance import (
     scatter_of,
     scatter_of_all,
 )
+from planner.contacts import LISTED_FROM, ObjectsOnMap, Sighting
 from planner.fleet_map import FleetMap
 from planner.risk import to_levels
 from planner.types import DetectionCurve, GridSpec, SweepFrame
@@ -34,6 +35,14 @@ def left_of(risk: float | np.ndarray, found: float, scatter: float = 0.0, place:
     told = mines_left(np.broadcast_to(risk, ALL.shape).astype(np.float64), ALL, place, CELL_M2, found, scatter)
     assert told is not None
     return told
+
+
+def with_objects(fleet: FleetMap, mines: int, doubtful: int = 0) -> ObjectsOnMap:
+    """So many mines for certain, side by side on the southernmost row, and so many objects of which some may be one."""
+    objects = ObjectsOnMap(fleet)
+    for number in range(mines + doubtful):
+        objects.hear(Sighting("one", 2.5 * number, 1.0, 0.0, 1.0 if number < mines else 0.51))
+    return objects
 
 
 def negative_binomial(mines: float, chance: float) -> Any:
@@ -182,10 +191,10 @@ def test_of_a_map_it_is_what_its_cells_tell(rho: float, of_a_part: bool) -> None
     inside = ALL.copy()
     inside[:3, :4] = False
     west = np.broadcast_to(np.arange(10) < 6, ALL.shape)
-    told = mines_left_by(fleet, inside, 20.0, 0.1, (inside & west).astype(np.float64) if of_a_part else None)
+    found, place = with_objects(fleet, 20), (inside & west).astype(np.float64) if of_a_part else None
+    told = mines_left_by(found, inside, 0.1, place)
     expected = mines_left(fleet.risk, inside, inside & west if of_a_part else inside, CELL_M2, 20.0, 0.1)
-    place = (inside & west).astype(np.float64) if of_a_part else None
-    cautious = mines_left_by(fleet, inside, 20.0, 0.1, place, CAUTIOUS_MINES)
+    cautious = mines_left_by(found, inside, 0.1, place, CAUTIOUS_MINES)
     assert told is not None
     assert expected is not None
     assert cautious is not None
@@ -201,10 +210,10 @@ def test_of_a_place_so_much_of_each_cell_counts_as_lies_there() -> None:
     fleet.join("one", 0, whole_map(levels, levels))
     place = np.zeros(ALL.shape)
     place[0, 0], place[0, 9], place[1, 9] = 0.1, 0.5, 1.0
-    told = mines_left_by(fleet, ALL, 7.5, 0.0, place)
+    told = mines_left_by(with_objects(fleet, 7), ALL, 0.0, place)
     assert told is not None
     # Seen is the worth of 40 cells times 0.75 and 40 times 0.5; left are 0.1 x 0.25 + 1.5 x 0.5 cells.
-    assert told.mean == pytest.approx(8.0 * 0.775 / 50.0, rel=1e-2)
+    assert told.mean == pytest.approx(7.5 * 0.775 / 50.0, rel=1e-2)
     assert told.clearance == pytest.approx((1.6 - 0.775) / 1.6, rel=1e-2)
     # A place may hold what is not in the area's cells, and nobody looked.
     levels = np.zeros_like(levels)
@@ -213,10 +222,69 @@ def test_of_a_place_so_much_of_each_cell_counts_as_lies_there() -> None:
     other.join("one", 0, whole_map(levels, levels))
     beside = np.zeros(ALL.shape)
     beside[:, 0] = 0.2
-    told = mines_left_by(other, np.broadcast_to(np.arange(10) > 0, ALL.shape), 7.5, 0.0, beside)
+    told = mines_left_by(with_objects(other, 7), np.broadcast_to(np.arange(10) > 0, ALL.shape), 0.0, beside)
     assert told is not None
     assert told.clearance == 0.0
-    assert told.mean == pytest.approx(8.0 * 1.6 / (72.0 * (1.0 - other.risk[0, 1])))
+    assert told.mean == pytest.approx(7.5 * 1.6 / (72.0 * (1.0 - other.risk[0, 1])))
+
+
+def test_a_mine_that_is_not_listed_is_left() -> None:
+    """What is left is the sum of those not seen and of those not listed, each with its own chance."""
+    unlisted, half = np.array([0.3, 0.1, 0.2]), np.full(ALL.shape, 0.5)
+    told = mines_left(half, ALL, ALL, CELL_M2, 5.0, 0.0, unlisted=unlisted)
+    assert told is not None
+    assert told.found == 5.0
+    unseen = negative_binomial(5.0 + 0.6 + PRIOR_MINES, 0.5).pmf(np.arange(60))
+    others = [0.7 * 0.9 * 0.8, 0.3 * 0.9 * 0.8 + 0.7 * 0.1 * 0.8 + 0.7 * 0.9 * 0.2, 0.0, 0.3 * 0.1 * 0.2]
+    others[2] = 1.0 - sum(others)
+    reached = np.convolve(unseen, others).cumsum()
+    assert told.reached[:50] == pytest.approx(reached[:50])
+    assert told.none == pytest.approx(unseen[0] * others[0])
+    assert told.mean == pytest.approx(6.1 + 0.6)
+    assert [told.low, told.high] == np.searchsorted(reached, [0.05, 0.95]).tolist()
+    # Of 12.2 that lie there, with the prior's half, 6.1 were seen, of which 5.5 count as found.
+    assert told.clearance == pytest.approx(5.5 / 12.2)
+    # Where one lies a quarter within a place, and the others do not.
+    some = mines_left(half, ALL, ALL, CELL_M2, 5.0, 0.0, unlisted=unlisted, there=np.array([0.25, 0.0, 0.0]))
+    assert some is not None
+    assert some.none == pytest.approx(unseen[0] * 0.925)
+    assert some.mean == pytest.approx(6.1 + 0.075)
+
+
+def test_of_what_may_be_seen_there_no_more_is_found_than_there_is() -> None:
+    one = np.zeros(ALL.shape, dtype=np.bool_)
+    one[0, 0] = True
+    told = mines_left(np.full(ALL.shape, 0.5), ALL, one, CELL_M2, 5.0, 0.0, unlisted=np.array([0.3]))
+    assert told is not None
+    assert told.clearance == 0.0  # some 0.07 are expected to be seen in the cell, and 0.3 to lie there unlisted
+
+
+def test_of_a_fleets_objects_those_count_as_found_that_are_listed_and_the_others_where_they_lie() -> None:
+    fleet = FleetMap(GridSpec(SweepFrame(0.0, 0.0, 0.0), 5.0, columns=10, rows=8))
+    levels = to_levels(np.full(ALL.shape, 0.7))
+    fleet.join("one", 0, whole_map(levels, levels))
+    objects = with_objects(fleet, 8, 4)
+    mines = objects.known()[1][:, 0]
+    assert mines[:8] == pytest.approx(1.0)
+    assert (mines[8:] > 0.1).all()
+    assert (mines[8:] < LISTED_FROM).all()
+    told = mines_left_by(objects, ALL, 0.1)
+    expected = mines_left(fleet.risk, ALL, ALL, CELL_M2, 8.0, 0.1, unlisted=mines[8:])
+    assert told is not None
+    assert expected is not None
+    assert (told.found, told.mean, told.none) == pytest.approx((8.0, expected.mean, expected.none))
+    # On the row's cells from the ninth object on: 20, 22.5, 25 and 27.5 m east, in columns of 5 m from -2.5 m on.
+    place = np.zeros(ALL.shape)
+    place[0, 4], place[0, 6] = 1.0, 0.5
+    place[1, 4] = 3.0
+    there = mines_left_by(objects, ALL, 0.1, place)
+    without = mines_left_by(with_objects(fleet, 8), ALL, 0.1, place)
+    assert there is not None
+    assert without is not None
+    columns = np.rint(np.array([20.0, 22.5, 25.0, 27.5]) / 5.0)
+    share = np.where(columns == 4, 1.0, np.where(columns == 6, 0.5, 0.0))
+    assert there.mean == pytest.approx(without.mean * (8.5 + mines[8:].sum()) / 8.5 + (mines[8:] * share).sum())
+    assert mines_left_by(ObjectsOnMap(), ALL, 0.1) is None
 
 
 def test_of_several_vehicles_the_one_whose_tracks_differ_most_counts() -> None:

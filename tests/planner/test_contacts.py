@@ -10,7 +10,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from told_tile import whole_map
 
-from planner.contacts import LISTED_FROM, Objects, ObjectsOnMap, Sighting, likelihood_ratio, surer_by
+from planner.contacts import (
+    LISTED_FROM,
+    Objects,
+    ObjectsOnMap,
+    Sighting,
+    are_listed,
+    likelihood_ratio,
+    surer_by,
+)
 from planner.fleet_map import FleetMap
 from planner.risk import NATS_PER_LEVEL
 from planner.types import GridSpec, SweepFrame
@@ -306,7 +314,7 @@ def test_chances_are_those_under_which_what_was_heard_is_likeliest(heard: list[l
     for _ in range(200):
         weighed = [[one * share for one, share in zip(row, shares, strict=True)] for row in likely]
         found = [[one / sum(row) for one in row] for row in weighed]
-        shares = [max(sum(column) / len(found), 1e-6) for column in zip(*found, strict=True)]
+        shares = [(sum(column) + 1.0) / (len(found) + 3.0) for column in zip(*found, strict=True)]
     told = objects.seen().chances(np.array(nats[: len(heard)]))
     assert told == pytest.approx(np.array(found), rel=1e-6, abs=1e-12)
 
@@ -343,6 +351,14 @@ def test_what_is_seen_hundreds_of_times_where_next_to_nothing_was_looked_at_stil
 
 def test_what_is_as_likely_a_mine_as_not_is_listed_and_that_of_which_nothing_is_known_is_not() -> None:
     assert 1 / 3 < LISTED_FROM < 0.5
+    nearly = LISTED_FROM - 1e-12  # what another processor may make of just as much
+    assert are_listed(np.array([0.3333, 0.349999, nearly, LISTED_FROM, 0.5])).tolist() == [
+        False,
+        False,
+        True,
+        True,
+        True,
+    ]
 
 
 def test_nothing_heard_is_no_mine() -> None:

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim_world.kinds import CYLINDER, MIXTURES, TRUNCATED_CONE, Alike, Kind, Mixture, make_kinds
+from secondlook.scenario import load_scenario
+from sim_world.kinds import ALIKE, CYLINDER, MIXTURES, TRUNCATED_CONE, Alike, Kind, Mixture, make_kinds
 
 MINES = MIXTURES["mines"]
 
@@ -31,12 +32,19 @@ def test_the_mean_over_bearings_is_as_told(kind: Kind) -> None:
     assert kind.shown_m(turned_rad).mean() == pytest.approx(kind.mean_shown_m, rel=1e-6)
 
 
-def test_strengths_have_the_mean_1_over_the_mixture() -> None:
-    targets = mixture(200_000)
+def test_a_scenario_may_name_every_mixture() -> None:
+    for name in MIXTURES:
+        assert load_scenario("tellaro", [f"targets.kinds={name}"]).targets.kinds == (None if name == ALIKE else name)
+
+
+@pytest.mark.parametrize("kinds", [kinds for kinds in MIXTURES.values() if kinds])
+def test_strengths_have_the_mean_1_over_the_mixture(kinds: tuple[Kind, ...]) -> None:
+    targets = mixture(200_000, kinds=kinds)
     strengths = targets.strength(np.arange(200_000), np.full(200_000, 0.7))
     assert strengths.mean() == pytest.approx(1.0, abs=4.0 * strengths.std() / math.sqrt(200_000))
     assert strengths.min() > 0.0
     assert strengths.std() > 0.3
+    assert {kinds[number] for number in targets._kind} == set(kinds)
 
 
 def test_the_strength_of_one_target_by_hand() -> None:

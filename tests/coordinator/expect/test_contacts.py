@@ -46,7 +46,7 @@ def test_it_is_by_how_much_it_makes_the_number_of_mines_surer_over_how_dense_the
     told = fleet_with_contacts()
     hear(told, (200.0, 102.5), first=41)
     contacts = known(told)
-    seen, chances = contacts._objects.known()
+    seen, chances = contacts.objects.known()
     (place,) = np.flatnonzero(np.abs(seen.y_m - 102.5) < 1.0)
     by = float(surer_by(chances[place : place + 1], np.log(2.0))[0])  # a look that takes half sees ln 2 nats
     assert by > 0.03
@@ -174,14 +174,14 @@ def test_of_one_number_contacts_of_other_vehicles_and_other_starts_are_others() 
     for more, (name, incarnation) in enumerate([(PRIMARY, 1), (HELPER, 0), (HELPER, 1)], 1):
         mine = Contact(30.0 * more, 200.0, 1.0, 0.9, 1)
         told.node.hear(f"agent/{name}/contact/1", mine, incarnation=incarnation)
-        assert known(told).mines == pytest.approx(20 + more, abs=0.1)
+        assert known(told).objects.mines == pytest.approx(20 + more, abs=0.1)
 
 
 def test_a_contact_that_comes_twice_is_one() -> None:
     told = fleet_with_contacts()
-    before = known(told).mines
+    before = known(told).objects.mines
     hear(told, (0.0, 300.0), score=0.1)  # its number was said before, with another score
-    assert known(told).mines == pytest.approx(before)
+    assert known(told).objects.mines == pytest.approx(before)
 
 
 def test_a_strip_is_cut_where_contacts_may_be_mines() -> None:

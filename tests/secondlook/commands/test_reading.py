@@ -37,6 +37,7 @@ def test_a_mission_is_read_about_so_often(
     ("command", "done"),
     [
         (("report",), "done"),
+        (("mines",), "done"),
         (("geojson", "--out", "map.geojson"), "done"),
         (("export", "--origin", "44", "10"), "done"),
         (("replay",), "done"),

@@ -116,6 +116,8 @@ def test_check_flies_it_to_see_whether_it_is_reached(called: Call) -> None:
     assert told.startswith(
         "mission.goal: a clearance of 0.3 with a chance of 0.9 is reached in 3 of 3 missions flown to try it, after "
     )
+    code, out, err = called("check", str(BRIEF), "--set", SOME, "--no-trial")
+    assert (code, "mission.goal" in out, err) == (0, False, "")
     code, out, err = called("check", str(BRIEF), "--set", ALL)
     assert (code, "mission.goal" in out) == (0, False)
     assert err.startswith(

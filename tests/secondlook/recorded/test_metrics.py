@@ -374,7 +374,7 @@ class TestRisk:
         assert (metrics.now_ms, metrics.misfits) == (0, 0)
         assert (summary["risk"], summary["risk_primary_alone"], summary["risk_at"]) == (None, None, [])
         assert summary["primary_s"] is None
-        assert summary["truth"] == {"targets": 0, "missed_share": None, "predicted_missed_share": None}
+        assert summary["truth"] == {"targets": 0, "left": 0, "missed_share": None, "predicted_missed_share": None}
         assert summary["mines"] is None
 
     def test_contacts_of_one_thing_are_one_object_and_tell_how_many_are_left(self) -> None:
@@ -422,6 +422,7 @@ class TestTruth:
         stream.say(3, f"world/truth/look/{HELPER}", TruthLook(HELPER, 1, (4, 99), np.array([0.5, 0.5]), (4, 99)))
         truth = stream.metrics.summary()["truth"]
         assert (truth["targets"], truth["missed_share"]) == (6, 0.5)  # numbers 1, 3 and 5
+        assert truth["left"] == 6  # as nothing is listed
         expected = (3 * math.exp(-2) + math.exp(-1) + math.exp(-0.5) + 1) / 6
         assert truth["predicted_missed_share"] == pytest.approx(expected)
 
@@ -451,7 +452,8 @@ class TestTruth:
         for number, (x_m, y_m) in enumerate(((3.5, 4.0), (23.0, 15.0))):
             stream.say(2, f"agent/{PRIMARY}/contact/{number}", Contact(x_m, y_m, 0.2, 0.9, 1))
         truth = stream.metrics.summary()["truth"]
-        assert stream.metrics.truly_found() == pytest.approx(2 / 3)
+        assert stream.metrics.truly_found() == pytest.approx(1 / 3)
+        assert truth["left"] == 2
         # Of the two that were detected the first one; and one that is none, on 10 cells of 100 m2.
         assert (truth["listed_share"], truth["false_listed_per_km2"]) == (0.5, pytest.approx(1000))
 
@@ -464,13 +466,17 @@ class TestTruth:
         truth = stream.metrics.summary()["truth"]
         assert (truth["listed_share"], truth["false_listed_per_km2"]) == (None, 3000.0)
 
-    def test_found_are_those_that_somebody_has_detected_of_all_or_of_some_ground(self) -> None:
+    def test_found_are_those_that_are_detected_and_listed_of_all_or_of_some_ground(self) -> None:
         stream = begun()
         assert stream.metrics.truly_found() is None
         targets = tuple(TruthTarget(x_m, y_m) for x_m, y_m in ((3.0, 4.0), (17.0, 4.0), (30.0, 15.0), (35.0, 15.0)))
         stream.say(0, "world/truth/targets", TruthTargets(targets))
         assert stream.metrics.truly_found() == 0.0
         stream.say(1, f"world/truth/look/{PRIMARY}", TruthLook(PRIMARY, 1, (0,), np.array([0.9]), (0,)))
+        assert stream.metrics.truly_found() == 0.0
+        for number, x_m in ((1, 3.0), (2, 17.0)):  # at the second one an alarm of nothing: nobody has detected it
+            stream.say(1, f"agent/{PRIMARY}/contact/{number}", Contact(x_m, 4.0, 0.2, 0.9, 1))
+        assert stream.metrics.targets_found().tolist() == [True, False, False, False]
         assert stream.metrics.truly_found() == 0.25
         # The second one lies on the border.
         assert stream.metrics.truly_found(shapely.box(0, 0, 17, 10)) == 0.5

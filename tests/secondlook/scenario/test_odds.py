@@ -28,6 +28,7 @@ def odds(*overrides: str) -> str:
             "from other aspects looks share less, 60 degrees apart nothing",
         ),
         (["targets.kinds=mines"], "targets are mines, and it takes them for alike"),
+        (["targets.kinds=truncated_cones"], "targets are truncated cones, and it takes them for alike"),
         (["targets.layout.kind=lines"], "targets.layout is lines, and it takes them for spread at random"),
         (["targets.layout.kind=lines", "targets.count=0"], ""),
         (["vehicles.primary.sensor.false_alarms_per_km2=100"], ""),

@@ -1,0 +1,80 @@
+"""Whether a mission is the same on every processor: whole missions, with all that numpy makes of this one and without.
+
+python -m bench.processors [--scenarios a,b] [--seed N]
+
+Flies every bundled mission, or some, twice on the local bus, and a few with clutter, positions that err, a goal and a
+modem. A line for each tells whether both have one digest, and the exit code is 1 if any has not; 2 where this processor
+has nothing that not every one has, so that nothing can be told.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+
+from bench.clearance_tables import BOTH, CLUTTER, FALSE_ALARMS
+from bench.flown import Case
+from secondlook.scenario.bundled import scenario_names
+
+NOT_EVERYWHERE = " ".join(np.show_config(mode="dicts")["SIMD Extensions"].get("found", ()))
+"""What numpy makes use of that not every processor has."""
+ERRING = tuple(f"vehicles.{one}.position_error_m=10" for one in BOTH)
+NONE_LEFT = "mission.goal={kind: none_left, chance: 0.8}"
+ODD: tuple[Case, ...] = (
+    ("tellaro", ("targets.count=20", CLUTTER, *map(FALSE_ALARMS.format, BOTH))),
+    ("tellaro", (*ERRING, *map(FALSE_ALARMS.format, BOTH))),
+    ("two-helpers", ("targets.count=10", "mission.deadline_factor=2", NONE_LEFT)),
+    ("patchy", ("link.profile=janus",)),
+)
+"""Missions that decide by more than bundled ones do."""
+
+
+def digest(case: Case, seed: int, without: str) -> str:
+    """That of a mission, flown in a process that does without some of what the processor has."""
+    scenario, overrides = case
+    environment = os.environ | ({"NPY_DISABLE_CPU_FEATURES": without} if without else {})
+    program = "from secondlook.installed_command import main; main()"
+    with tempfile.TemporaryDirectory() as folder:
+        words = ["run", scenario, "--bus", "local", "--no-record", "--seed", str(seed), "--out", folder]
+        set_ = [word for one in overrides for word in ("--set", one)]
+        subprocess.run(
+            [sys.executable, "-P", "-c", program, *words, *set_], check=True, env=environment, stdout=subprocess.DEVNULL
+        )
+        return str(json.loads((Path(folder) / "summary.json").read_text())["digest"])
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Flies them; the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m bench.processors", description=__doc__)
+    parser.add_argument("--scenarios", default=",".join(scenario_names()), metavar="A,B")
+    parser.add_argument("--seed", type=int, default=11)
+    options = parser.parse_args(arguments)
+    if not NOT_EVERYWHERE:
+        print("numpy makes use of nothing here that not every processor has: nothing can be told", file=sys.stderr)
+        return 2
+    named = options.scenarios.split(",")
+    cases = [*((name, ()) for name in named), *(case for case in ODD if case[0] in named)]
+    differ = 0
+    with ThreadPoolExecutor(os.cpu_count()) as at_once:
+        flights = [
+            [at_once.submit(digest, case, options.seed, without) for without in ("", NOT_EVERYWHERE)] for case in cases
+        ]
+        for (scenario, overrides), both in zip(cases, flights, strict=True):
+            one, other = (flight.result() for flight in both)
+            differ += one != other
+            print(f"{'one digest' if one == other else 'DIFFER'}  {' '.join((scenario, *overrides))}", flush=True)
+    print(f"without {NOT_EVERYWHERE}: {differ} of {len(cases)} missions differ")
+    return 1 if differ else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

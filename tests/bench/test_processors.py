@@ -1,0 +1,50 @@
+"""Missions that are not the same on every processor are noticed."""
+
+from __future__ import annotations
+
+import pytest
+
+from bench import processors
+from bench.flown import Case
+from secondlook.scenario.bundled import scenario_names
+
+Patch = pytest.MonkeyPatch
+Output = pytest.CaptureFixture[str]
+
+
+def told_by(monkeypatch: Patch, differing: str = "") -> None:
+    def digest(case: Case, seed: int, without: str) -> str:
+        return f"{case} {seed}" + (without if case[0] == differing else "")
+
+    monkeypatch.setattr(processors, "digest", digest)
+    monkeypatch.setattr(processors, "NOT_EVERYWHERE", "X86_V4")
+
+
+def test_one_that_differs_is_told_and_fails(monkeypatch: Patch, capsys: Output) -> None:
+    told_by(monkeypatch, differing="patchy")
+    assert processors.main(["--scenarios", "clear,patchy"]) == 1
+    assert capsys.readouterr().out.splitlines() == [
+        "one digest  clear",
+        "DIFFER  patchy",
+        "DIFFER  patchy link.profile=janus",
+        "without X86_V4: 2 of 3 missions differ",
+    ]
+
+
+def test_all_alike_is_well(monkeypatch: Patch, capsys: Output) -> None:
+    told_by(monkeypatch)
+    assert processors.main([]) == 0
+    assert capsys.readouterr().out.endswith(f"0 of {len(scenario_names()) + 4} missions differ\n")
+
+
+def test_where_nothing_can_be_told_it_does_not_pass(monkeypatch: Patch, capsys: Output) -> None:
+    monkeypatch.setattr(processors, "NOT_EVERYWHERE", "")
+    assert processors.main([]) == 2
+    assert "nothing can be told" in capsys.readouterr().err
+
+
+def test_a_mission_flown_with_less_has_its_digest() -> None:
+    brief = ("tellaro", ("area.polygon_m=[[0, 0], [150, 0], [150, 60], [0, 60]]",))
+    with_all, with_less = (processors.digest(brief, 3, without) for without in ("", processors.NOT_EVERYWHERE))
+    assert len(with_all) == 64
+    assert with_all == with_less != processors.digest(brief, 4, "")

@@ -1,0 +1,71 @@
+"""`secondlook mines` tells what `RecordedMission.mines_left` does."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+import shapely
+from called import Call
+
+import secondlook
+from planner.clearance import MinesLeft
+
+
+def risk(left: MinesLeft | None) -> str:
+    assert left is not None
+    assert 0.0 < left.none < 1.0
+    return f"the risk that one is: {1.0 - left.none:.1%}\n"
+
+
+def test_of_the_area_of_a_polygon_and_of_a_lane(called: Call, brief_run: Path) -> None:
+    mission = secondlook.load(brief_run)
+    left = mission.mines_left()
+    assert left is not None
+    assert left.mean > 10.0
+    words = f"in the area about {left.mean:.0f} mines are left, {left.low} to {left.high} with 90 %; "
+    told = called("mines", str(brief_run))
+    assert (told.code, told.out) == (0, words + risk(left))
+
+    small = mission.mines_left(shapely.box(10, 20, 12, 22))
+    assert small is not None
+    told = called("mines", str(brief_run), "--polygon", "10,20 12,20 12,22 10,22")
+    assert (
+        told.out == f"in the polygon about {small.mean:.2f} mines are left, 0 to {small.high} with 90 %; {risk(small)}"
+    )
+
+    corner = shapely.box(10, 20, 70, 60)
+    told = called("mines", str(brief_run), "--polygon", "10,20 70,20 70,60 10,60")
+    assert told.out.startswith("in the polygon about ")
+    assert told.out.endswith(risk(mission.mines_left(corner)))
+
+    lane = shapely.LineString([(150, 10), (180, 90)]).buffer(10, cap_style="flat")
+    told = called("mines", str(brief_run), "--lane", "150,10  180,90", "--width", "20")
+    assert told.out.startswith("in the lane about ")
+    assert told.out.endswith(risk(mission.mines_left(lane)))
+
+
+def test_of_what_was_not_to_be_surveyed_it_says_so(called: Call, brief_run: Path) -> None:
+    east_m, north_m = secondlook.load(brief_run).area.bounds[2:]
+    beyond = f"{east_m - 30},0 {east_m + 10},0 {east_m + 10},{north_m} {east_m - 30},{north_m}"
+    told = called("mines", str(brief_run), "--polygon", beyond)
+    assert told.out.splitlines()[1] == "of the polygon 75% was to be surveyed; of the rest nothing is known"
+
+
+def test_of_a_mission_without_a_look_nothing_is_said(called: Call, tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    overrides = ("--set", "mission.time_limit_s=5", "--anyway", "--no-report")
+    assert called("run", "tellaro", "--bus", "local", *overrides, "--out", str(run)).code == 1
+    told = called("mines", str(run))
+    assert (told.code, told.out) == (2, "")
+    assert f"{run}: nothing of the area was seen, so nothing can be said" in told.err
+    shutil.rmtree(run)
+    assert called("mines", str(run)).code == 2
+
+
+@pytest.mark.parametrize("points", ["1e3,20 1000.0,380.5", "\t1000,20\n1000,380.5 "])
+def test_points_may_be_written_in_several_ways(called: Call, brief_run: Path, points: str) -> None:
+    told = called("mines", str(brief_run), "--lane", points, "--width", "20")
+    assert told.code == 2
+    assert told.err == "within: nothing of the area lies there; must be a polygon in the mission frame\n"
