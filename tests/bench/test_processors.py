@@ -6,7 +6,6 @@ import pytest
 
 from bench import processors
 from bench.flown import Case
-from secondlook.scenario.bundled import scenario_names
 
 Patch = pytest.MonkeyPatch
 Output = pytest.CaptureFixture[str]
@@ -34,7 +33,7 @@ def test_one_that_differs_is_told_and_fails(monkeypatch: Patch, capsys: Output) 
 def test_all_alike_is_well(monkeypatch: Patch, capsys: Output) -> None:
     told_by(monkeypatch)
     assert processors.main([]) == 0
-    assert capsys.readouterr().out.endswith(f"0 of {len(scenario_names()) + 4} missions differ\n")
+    assert capsys.readouterr().out.endswith(f"0 of {len(processors.BUNDLED) + 4} missions differ\n")
 
 
 def test_where_nothing_can_be_told_it_does_not_pass(monkeypatch: Patch, capsys: Output) -> None:
