@@ -172,7 +172,7 @@ def test_the_summary_has_all_that_is_promised(landed: Landed) -> None:
     assert [one["t_s"] for one in summary["risk_at"]] == pytest.approx(
         [summary["time"]["primary_s"], 1.05 * summary["time"]["primary_s"]], abs=0.001
     )
-    truth = {"targets", "missed_share", "predicted_missed_share", "listed_share", "false_listed_per_km2"}
+    truth = {"targets", "left", "missed_share", "predicted_missed_share", "listed_share", "false_listed_per_km2"}
     assert summary["truth"].keys() == truth
     strips = summary["hotspots"]
     assert strips["published"] == sum(strips[name] for name in ("revisited", "left", "withdrawn", "failed")) > 0
