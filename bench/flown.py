@@ -18,6 +18,8 @@ import secondlook
 
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "docs" / "figures"
+PROGRAM = "from secondlook.installed_command import main; main()"
+"""What a Python of ours does to be the command `secondlook`."""
 DIGITS = 6  # of what is kept: more than tables tell
 
 Document = dict[str, Any]
@@ -70,9 +72,13 @@ class Table:
 def call_secondlook(*arguments: str, quiet: bool = False) -> None:
     """Gives a command of the program, in a process of its own. `quiet`: what that prints is not shown. Raises
     CalledProcessError where it fails."""
-    program = "from secondlook.installed_command import main; main()"
     shown = subprocess.DEVNULL if quiet else None
-    subprocess.run([sys.executable, "-c", program, *arguments], check=True, cwd=ROOT, stdout=shown, stderr=shown)
+    subprocess.run([sys.executable, "-c", PROGRAM, *arguments], check=True, cwd=ROOT, stdout=shown, stderr=shown)
+
+
+def as_options(overrides: Iterable[str]) -> list[str]:
+    """Overrides as a command line has them."""
+    return [word for one in overrides for word in ("--set", one)]
 
 
 def fly_overridden(folder: Path, flown: Iterable[Case], seeds: str, figures: Iterable[str]) -> Document:
@@ -80,8 +86,7 @@ def fly_overridden(folder: Path, flown: Iterable[Case], seeds: str, figures: Ite
     rows = []
     for place, (scenario, overrides) in enumerate(flown):
         out = folder / str(place)
-        set_ = [word for one in overrides for word in ("--set", one)]
-        call_secondlook("sweep", scenario, "--seeds", seeds, *set_, "--out", str(out))
+        call_secondlook("sweep", scenario, "--seeds", seeds, *as_options(overrides), "--out", str(out))
         swept = secondlook.load_sweep(out).table.to_pylist()
         told = {"scenario": scenario, "overrides": list(overrides)}
         rows += [{**told, **some(row, figures)} for row in swept]

@@ -8,7 +8,7 @@ from statistics import fmean
 
 import secondlook
 from bench import link_curve, link_maps, link_share
-from bench.flown import Document, Mission, Table, call_secondlook, figures_left, fly_overridden, kept, some
+from bench.flown import Document, Mission, Table, as_options, call_secondlook, figures_left, fly_overridden, kept, some
 from bench.rows import MISSION
 
 LINKED = ("tellaro", "two-helpers", "patchy")
@@ -34,7 +34,7 @@ def _fly_linked(folder: Path) -> Document:
     for profile, also in LINKS:
         for scenario in LINKED:
             out = folder / "-".join((scenario, profile, also.replace(" ", "_")))
-            set_ = [word for one in _of_link(scenario, profile, also) for word in ("--set", one)]
+            set_ = as_options(_of_link(scenario, profile, also))
             varied = ("--vary", "coordinator.platform=ship,primary")
             call_secondlook("sweep", scenario, "--seeds", LINKED_SEEDS, *set_, *varied, "--out", str(out))
             link = {"link.profile": profile, "link.also": also}

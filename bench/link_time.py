@@ -15,7 +15,7 @@ import tempfile
 import time
 from collections.abc import Sequence
 
-from bench.flown import call_secondlook
+from bench.flown import as_options, call_secondlook
 
 WITHOUT = "ideal"
 PROFILES = ("micromodem-0", "micromodem-1", "micromodem-6", "janus")
@@ -24,7 +24,7 @@ PROFILES = ("micromodem-0", "micromodem-1", "micromodem-6", "janus")
 def took_s(scenario: str, profile: str, sets: Sequence[str]) -> float:
     """The wall time of one mission. Raises CalledProcessError where it fails."""
     with tempfile.TemporaryDirectory(prefix="secondlook-link-") as folder:
-        settings = [word for one in (f"link.profile={profile}", *sets) for word in ("--set", one)]
+        settings = as_options((f"link.profile={profile}", *sets))
         began_s = time.monotonic()
         call_secondlook("run", scenario, "--out", f"{folder}/run", *settings, quiet=True)
         return time.monotonic() - began_s

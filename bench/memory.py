@@ -34,6 +34,7 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
+from bench.flown import as_options
 from bench.recorder_cost import SLOW
 from secondlook.fleet.nodes import COORDINATOR, RECORDER, WORLD
 from secondlook.launch.mission import RunOptions, run_mission
@@ -73,7 +74,7 @@ def mb_a_mission(scenario: Scenario, missions: int, *, record: bool) -> float:
 def spread_fleet(folder: Path, factor: float) -> Iterator[dict[str, subprocess.Popen[bytes]]]:
     """The processes of a long mission, by name; none of them is left."""
     source, *settings = SLOW.split(":")
-    options = [word for one in (*settings, *LONG) for word in ("--set", one)]
+    options = as_options((*settings, *LONG))
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         endpoint = f"tcp/127.0.0.1:{free.getsockname()[1]}"

@@ -21,8 +21,8 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.clearance_tables import BOTH, CLUTTER, FALSE_ALARMS
-from bench.flown import Case
+from bench.clearance_tables import BOTH, CLUTTER, FALSE_ALARMS, NONE_LEFT
+from bench.flown import PROGRAM, Case, as_options
 from secondlook.scenario.bundled import scenario_names
 
 BUNDLED = [name for name in scenario_names() if name != "armada"]
@@ -30,11 +30,10 @@ BUNDLED = [name for name in scenario_names() if name != "armada"]
 NOT_EVERYWHERE = " ".join(np.show_config(mode="dicts")["SIMD Extensions"].get("found", ()))
 """What numpy makes use of that not every processor has."""
 ERRING = tuple(f"vehicles.{one}.position_error_m=10" for one in BOTH)
-NONE_LEFT = "mission.goal={kind: none_left, chance: 0.8}"
 ODD: tuple[Case, ...] = (
     ("tellaro", ("targets.count=20", CLUTTER, *map(FALSE_ALARMS.format, BOTH))),
     ("tellaro", (*ERRING, *map(FALSE_ALARMS.format, BOTH))),
-    ("two-helpers", ("targets.count=10", "mission.deadline_factor=2", NONE_LEFT)),
+    ("two-helpers", ("targets.count=10", "mission.deadline_factor=2", NONE_LEFT.format(0.8))),
     ("patchy", ("link.profile=janus",)),
 )
 """Missions that decide by more than bundled ones do."""
@@ -44,13 +43,10 @@ def digest(case: Case, seed: int, without: str) -> str:
     """That of a mission, flown in a process that does without some of what the processor has."""
     scenario, overrides = case
     environment = os.environ | ({"NPY_DISABLE_CPU_FEATURES": without} if without else {})
-    program = "from secondlook.installed_command import main; main()"
     with tempfile.TemporaryDirectory() as folder:
         words = ["run", scenario, "--bus", "local", "--no-record", "--seed", str(seed), "--out", folder]
-        set_ = [word for one in overrides for word in ("--set", one)]
-        subprocess.run(
-            [sys.executable, "-P", "-c", program, *words, *set_], check=True, env=environment, stdout=subprocess.DEVNULL
-        )
+        command = [sys.executable, "-P", "-c", PROGRAM, *words, *as_options(overrides)]
+        subprocess.run(command, check=True, env=environment, stdout=subprocess.DEVNULL)
         return str(json.loads((Path(folder) / "summary.json").read_text())["digest"])
 
 

@@ -38,6 +38,7 @@ from rich.console import Console
 from rich.table import Table
 
 import secondlook
+from bench.flown import PROGRAM, as_options
 from bench.replayed import ReplayedConfig
 from comms.lockstep.drive import Lockstep
 from comms.node import Received
@@ -80,9 +81,8 @@ class Flight:
 
 def fly(scenario: str, sets: list[str], folder: Path, *, record: bool) -> Flight:
     """Flies one mission. Raises RuntimeError where it fails."""
-    program = "from secondlook.installed_command import main; main()"
-    command = [sys.executable, "-c", program, "run", scenario, "--out", str(folder), "--no-report"]
-    command += [word for one in sets for word in ("--set", one)] + ([] if record else ["--no-record"])
+    command = [sys.executable, "-c", PROGRAM, "run", scenario, "--out", str(folder), "--no-report"]
+    command += as_options(sets) + ([] if record else ["--no-record"])
     before = os.times()
     run = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     with _sampling(lambda: _recorder_of(run.pid) if record else None) as samples:

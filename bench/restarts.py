@@ -27,6 +27,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from bench.flown import as_options
 from comms.keys import RunKeys
 from comms.node import Received
 from comms.runner import Intake
@@ -91,7 +92,7 @@ class Flight:
         self._routing = Routing(build_fleet(scenario, record=True).roster)
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
         self._heard_live: dict[tuple[str, bytes], Received] = {}
-        self._options = [source, *(word for one in settings for word in ("--set", one)), "--run", "bench"]
+        self._options = [source, *as_options(settings), "--run", "bench"]
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))
             self._endpoint = f"tcp/127.0.0.1:{free.getsockname()[1]}"

@@ -18,10 +18,11 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from bench.flown import PROGRAM
+
 BRIEF = Path(__file__).parents[1] / "tests" / "support" / "brief.yaml"
 BY_THE_WALL_CLOCK = ["time.wall_s", "time.real_time_factor"]
 LATEST_S = 6.0
-COMMAND = "from secondlook.installed_command import main; main()"
 
 
 def main() -> None:
@@ -68,7 +69,7 @@ def _start(out: Path, seeds: int) -> subprocess.Popen[bytes]:
     asked = ["sweep", str(BRIEF), "--seeds", f"1..{seeds}", "--vary", "coordinator.allocator=plan,none"]
     paths = os.pathsep.join(filter(None, sys.path))
     return subprocess.Popen(
-        [sys.executable, "-c", COMMAND, *asked, "--out", str(out)],
+        [sys.executable, "-c", PROGRAM, *asked, "--out", str(out)],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
         env={**os.environ, "PYTHONPATH": paths},

@@ -380,23 +380,16 @@ class Metrics:
         risk, missed = self.targets_met()
         if not risk.size:
             return {"targets": 0, "left": 0, "missed_share": None, "predicted_missed_share": None}
-        return {
-            "targets": risk.size,
-            "left": int((~self.targets_found()).sum()),
-            "missed_share": float(missed.mean()),
-            "predicted_missed_share": float(risk.mean()),
-            **self._truth_of_list(missed),
-        }
-
-    def _truth_of_list(self, missed: BoolArray) -> dict[str, float | None]:
-        """How right the list of mines is: the share of the targets that somebody has detected of which something
-        listed lies within reach, and how much is listed that is no target, a square kilometre of the area."""
         assert self.map is not None
-        there = self._listed_at_targets()
+        found, at_none = self.targets_found(), ~self._listed_at_targets().any(axis=1)
         area_km2 = float(self.inside.sum()) * self.map.grid.cell_area_m2 / 1e6
         return {
-            "listed_share": None if missed.all() else float(np.asarray(there.any(axis=0))[~missed].mean()),
-            "false_listed_per_km2": float((~there.any(axis=1)).sum()) / area_km2,
+            "targets": risk.size,
+            "left": int((~found).sum()),
+            "missed_share": float(missed.mean()),
+            "predicted_missed_share": float(risk.mean()),
+            "listed_share": None if missed.all() else float(found[~missed].mean()),
+            "false_listed_per_km2": float(at_none.sum()) / area_km2,
         }
 
     def _strip_summary(self) -> dict[str, Any]:

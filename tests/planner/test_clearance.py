@@ -249,6 +249,7 @@ def test_a_mine_that_is_not_listed_is_left() -> None:
     assert some is not None
     assert some.none == pytest.approx(unseen[0] * 0.925)
     assert some.mean == pytest.approx(6.1 + 0.075)
+    assert some.clearance == pytest.approx((6.1 - 0.075) / 12.2)
 
 
 def test_of_what_may_be_seen_there_no_more_is_found_than_there_is() -> None:
@@ -277,6 +278,8 @@ def test_of_a_fleets_objects_those_count_as_found_that_are_listed_and_the_others
     place = np.zeros(ALL.shape)
     place[0, 4], place[0, 6] = 1.0, 0.5
     place[1, 4] = 3.0
+    at_edge, weighty = place.copy(), place.copy()
+    at_edge[7, 9], weighty[0, 4] = 0.25, 3.0
     there = mines_left_by(objects, ALL, 0.1, place)
     without = mines_left_by(with_objects(fleet, 8), ALL, 0.1, place)
     assert there is not None
@@ -284,6 +287,19 @@ def test_of_a_fleets_objects_those_count_as_found_that_are_listed_and_the_others
     columns = np.rint(np.array([20.0, 22.5, 25.0, 27.5]) / 5.0)
     share = np.where(columns == 4, 1.0, np.where(columns == 6, 0.5, 0.0))
     assert there.mean == pytest.approx(without.mean * (8.5 + mines[8:].sum()) / 8.5 + (mines[8:] * share).sum())
+    # An object lies in a cell once at the most, whatever the cell counts.
+    there, without = (mines_left_by(one, ALL, 0.1, weighty) for one in (objects, with_objects(fleet, 8)))
+    assert there is not None
+    assert without is not None
+    assert there.mean == pytest.approx(without.mean * (8.5 + mines[8:].sum()) / 8.5 + (mines[8:] * share).sum())
+    # One that lies beyond the grid counts at its edge.
+    objects.hear(Sighting("one", 900.0, 900.0, 0.0, 0.51))
+    mines = objects.known()[1][:, 0]
+    there, without = (mines_left_by(one, ALL, 0.1, at_edge) for one in (objects, with_objects(fleet, 8)))
+    assert there is not None
+    assert without is not None
+    unlisted = (mines[8:] * [*share, 0.25]).sum()
+    assert there.mean == pytest.approx(without.mean * (8.5 + mines[8:].sum()) / 8.5 + unlisted)
     assert mines_left_by(ObjectsOnMap(), ALL, 0.1) is None
 
 

@@ -351,6 +351,7 @@ def test_what_is_seen_hundreds_of_times_where_next_to_nothing_was_looked_at_stil
 
 def test_what_is_as_likely_a_mine_as_not_is_listed_and_that_of_which_nothing_is_known_is_not() -> None:
     assert 1 / 3 < LISTED_FROM < 0.5
+    assert are_listed(np.array([0.349, 0.351])).tolist() == [False, True]
     nearly = LISTED_FROM - 1e-12  # what another processor may make of just as much
     assert are_listed(np.array([0.3333, 0.349999, nearly, LISTED_FROM, 0.5])).tolist() == [
         False,

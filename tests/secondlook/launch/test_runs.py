@@ -20,6 +20,7 @@ import pytest
 from called import Call
 from flights import BRIEF, events, flight, without_expected
 
+from bench.processors import NOT_EVERYWHERE
 from comms.keys import HostSpec
 from comms.lockstep.drive import Lockstep
 from comms.result import BusResult
@@ -230,8 +231,6 @@ UNTIL_S = {
     "two-helpers": 760,
     "wide": 283,
 }
-BEYOND_THE_LEAST = " ".join(np.show_config(mode="dicts")["SIMD Extensions"].get("found", ()))
-"""What numpy makes use of that not every processor has."""
 
 
 @pytest.mark.parametrize("name", scenario_names())
@@ -243,7 +242,7 @@ def test_every_bundled_mission_has_one_digest_on_both_buses_and_on_every_process
         overrides += [f"area.cell_m={25 if name == 'armada' else 10}", "coordinator.max_strip_m=500"]
     if name == "armada":
         overrides += ["area.polygon_m=[[0, 0], [10000, 0], [10000, 600], [0, 600]]"]
-    monkeypatch.setenv("NPY_DISABLE_CPU_FEATURES", BEYOND_THE_LEAST)  # in processes that are started from now on
+    monkeypatch.setenv("NPY_DISABLE_CPU_FEATURES", NOT_EVERYWHERE)  # in processes that are started from now on
     summaries = []
     for bus in ("local", "zenoh"):
         (tmp_path / bus).mkdir()
