@@ -1,7 +1,6 @@
 """The seabed's factor: hand-computed values of one patch, and what holds for every seabed."""
 
 import math
-import timeit
 
 import numpy as np
 import pytest
@@ -123,18 +122,6 @@ def test_factors_are_positive_smooth_and_the_same_point_by_point(
 
 def test_no_points_have_no_factors() -> None:
     assert patchy(1).factor(np.empty(0), np.empty(0), 0.0).shape == (0,)
-
-
-def test_a_look_asks_quickly() -> None:
-    seabed = patchy(1)
-    along_m, lateral_m = np.arange(20.0)[:, None], np.linspace(-135.0, 135.0, 56)
-    looks = [
-        (x + lateral_m + 0.0 * along_m, y + along_m + 0.0 * lateral_m) for x in range(0, 1200, 150) for y in (50, 250)
-    ]
-    per_look_s = min(timeit.repeat(lambda: [seabed.factor(*look, 0.0) for look in looks], number=1, repeat=5)) / len(
-        looks
-    )
-    assert per_look_s < 500e-6  # measured at 45 us; the bound leaves room for a busy machine
 
 
 @pytest.mark.parametrize(
