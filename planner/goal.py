@@ -7,11 +7,9 @@ from functools import cached_property
 
 import shapely
 
-from planner.clearance import MinesLeft
+from planner.clearance import DECIMALS, MinesLeft
 from planner.region import Region
 from planner.types import FloatArray, GridSpec, Point
-
-DECIMALS = 9  # of a chance: its last bits hang on the processor
 
 
 @dataclass(frozen=True)
@@ -49,18 +47,11 @@ class Goal:
 
     def chance_now(self, left: MinesLeft | None) -> float:
         """With which chance what is wanted is so; 0 where nothing was seen."""
-        return 0.0 if left is None else left.chance_of_at_most(self._may_be_left(left))
+        return 0.0 if left is None else left.chance_of_clearance(self.clearance)
 
     def is_reached(self, left: MinesLeft | None) -> bool:
         """Whether it is so with the chance that is wanted."""
         return round(self.chance_now(left), DECIMALS) >= self.chance
-
-    def cleared_with(self, left: MinesLeft | None) -> float:
-        """The share of the mines that is found with the chance that is wanted; 0 where nothing was seen."""
-        if left is None:
-            return 0.0
-        at_most = left.at_most_with(self.chance)
-        return left.found / (left.found + at_most) if at_most else 1.0
 
     @property
     def words(self) -> str:
@@ -80,10 +71,8 @@ class Goal:
             return f"the risk is {1.0 - now:.3f}"
         if self.clearance == 1.0:
             return f"the chance is {now:.3f}"
-        return f"the chance is {now:.3f}, and with {self.chance:.3g} the clearance is {self.cleared_with(left):.3f}"
-
-    def _may_be_left(self, left: MinesLeft) -> float:
-        return left.found * (1.0 / self.clearance - 1.0)
+        cleared = left.clearance_with(self.chance)
+        return f"the chance is {now:.3f}, and with {self.chance:.3g} the clearance is {cleared:.3f}"
 
 
 def goal_of_lane(lane: Lane, risk: float) -> Goal:

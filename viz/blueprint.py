@@ -29,7 +29,7 @@ def mission_blueprint(extent: Extent, run: RunInfo, *, has_link: bool = False) -
         ages, sent = rrb.Tabs(*_ages_views()), rrb.Tabs(_bytes_view(), _subjects_view(), _shares_view())
         beside = rrb.Vertical(ages, sent, row_shares=[4, 3])
     log = _log_view()
-    over_time = rrb.Tabs(_metrics_view(), _mines_view())
+    over_time = rrb.Tabs(_metrics_view(), _mines_view(), _clearance_view())
     if wide:
         layout: rrb.Container = rrb.Vertical(
             area,
@@ -121,6 +121,10 @@ def _metrics_view() -> rrb.TimeSeriesView:
 
 def _mines_view() -> rrb.TimeSeriesView:
     return _series_view(paths.MINES, "Mines", rrb.Corner2D.RightTop)
+
+
+def _clearance_view() -> rrb.TimeSeriesView:
+    return _series_view(paths.CLEARANCE, "Clearance", rrb.Corner2D.LeftTop, are_shares=True)
 
 
 def _log_view() -> rrb.TextLogView:

@@ -1,4 +1,5 @@
-"""How many mines may be left, over time: the mean and the 90 % interval, and how many are found."""
+"""How many mines may be left, over time: the mean and the 90 % interval, how many are found, and which share of all is;
+and with which chance none is left."""
 
 from __future__ import annotations
 
@@ -19,6 +20,8 @@ SERIES = {
     paths.MINES_LEFT: ("may be left", palette.WORST_RISK, 2.0),
     paths.MINES_LEFT_LOW: ("at least, with 95 %", palette.WORST_RISK, 0.75),
     paths.MINES_LEFT_HIGH: ("at most, with 95 %", palette.WORST_RISK, 0.75),
+    paths.CLEARANCE_SHARE: ("expected share of all mines that is found", palette.COVERED, 2.0),
+    paths.NONE_LEFT: ("chance that none is left", palette.WORST_RISK, 2.0),
 }
 
 
@@ -59,5 +62,6 @@ class Mines:
         scatter = scatter_of_all(list(one.values()) for one in self._curves.values())
         left = mines_left_by(self._objects, self._inside, scatter)
         if left is not None:
-            for path, value in zip(SERIES, (left.found, left.mean, left.low, left.high), strict=True):
+            values = left.found, left.mean, left.low, left.high, left.clearance, left.none
+            for path, value in zip(SERIES, values, strict=True):
                 self._canvas.put(time_ms, path, rr.Scalars(float(value)))

@@ -32,16 +32,18 @@ def mines(
         str | None, typer.Option(metavar="X,Y X,Y X,Y ...", help="Corners of a part, in the same metres.")
     ] = None,
 ) -> None:
-    """Tell how many mines may be left in a mission's area at its end, or in what of it lies in a polygon or a lane, and
-    the risk of a ship that passes there."""
+    """Tell how many mines may be left in a mission's area at its end, or in what of it lies in a polygon or a lane, the
+    clearance (which share of all mines there is expected to have been found), and the risk of a ship that passes
+    there."""
     name, place = _place(lane, width, polygon)
     with reading("mines", 1.0) as on_read:
         mission = load_run(run, on_read)
         left = mission.mines_left(place)
     if left is None:
         raise UserError(f"{run}: nothing of the area was seen, so nothing can be said; must be a run with a look")
-    typer.echo(_words(name, left))
-    if place is not None and (surveyed := _surveyed(mission, place)) < WHOLE:
+    surveyed = 1.0 if place is None else _surveyed(mission, place)
+    typer.echo(_words(name, left, is_whole=surveyed >= WHOLE))
+    if surveyed < WHOLE:
         typer.echo(f"of the {name} {surveyed:.0%} was to be surveyed; of the rest nothing is known")
 
 
@@ -84,10 +86,13 @@ def _points(option: str, told: str, least: int) -> tuple[tuple[float, float], ..
     return tuple(points)
 
 
-def _words(name: str, left: MinesLeft) -> str:
+def _words(name: str, left: MinesLeft, *, is_whole: bool) -> str:
     about = f"{left.mean:.0f}" if left.mean >= 10.0 else f"{left.mean:.2f}"
-    between, risk = f"{left.low} to {left.high} with 90 %", f"{1.0 - left.none:.1%}"
-    return f"in the {name} about {about} mines are left, {between}; the risk that one is: {risk}"
+    risk = f"{'' if is_whole else 'at least '}{1.0 - left.none:.1%}"
+    return (
+        f"in the {name} about {about} mines are left, {left.low} to {left.high} with 90 %; the clearance is "
+        f"{left.clearance:.0%}; none is left with {left.none:.1%}, and the risk that one is: {risk}"
+    )
 
 
 def _surveyed(mission: RecordedMission, place: BaseGeometry) -> float:

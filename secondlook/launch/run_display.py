@@ -46,7 +46,7 @@ def mines_left_words(mines: Mapping[str, Any]) -> str:
     """How many mines may be left, and how sure that is, by that part of the summary."""
     return (
         f"about {mines['left']:.0f}, {mines['left_low']} to {mines['left_high']} with 90 %; none with "
-        f"{mines['none_left']:.1%}; {mines['found']:.0f} found"
+        f"{mines['none_left']:.1%}; {mines['found']:.0f} found, a clearance of {mines['clearance']:.0%}"
     )
 
 

@@ -230,16 +230,19 @@ def objects(seen: SeenObjects, chances: FloatArray) -> list[ObjectRecord]:
 @dataclass(frozen=True)
 class TargetRecord:
     """A target on the seabed at its true place, mission frame. `found_by` and `found_s`: the first look that detected
-    it; None if none did."""
+    it; None if none did. `listed`: whether it was detected and is on the list of mines at the end: else it is left."""
 
     number: int
     found_by: str | None
     found_s: float | None
+    listed: bool
     point: shapely.Point
 
 
-def targets(truth: Iterable[Received[TruthTargets]], looks: Iterable[Received[TruthLook]]) -> list[TargetRecord]:
-    """All targets; none where nobody knows them."""
+def targets(
+    truth: Iterable[Received[TruthTargets]], looks: Iterable[Received[TruthLook]], listed: BoolArray
+) -> list[TargetRecord]:
+    """All targets, and which are `listed`, by number; none where nobody knows them."""
     first: dict[int, Received[TruthLook]] = {}
     for look in looks:
         for number in look.message.detected:
@@ -250,6 +253,7 @@ def targets(truth: Iterable[Received[TruthTargets]], looks: Iterable[Received[Tr
             number,
             first[number].vehicle if number in first else None,
             first[number].t_s if number in first else None,
+            bool(listed[number : number + 1].any()),  # of a run that was never announced nothing is
             shapely.Point(place.x_m, place.y_m),
         )
         for number, place in enumerate(places)

@@ -42,6 +42,7 @@ from planner.risk import RiskStatistics, risk_statistics
 from planner.types import BoolArray, DetectionCurve, FloatArray, GridSpec, Point
 from secondlook.recorded.closest_approach import ClosestApproaches
 from secondlook.recorded.kept_out import Entries
+from secondlook.recorded.listed import matched
 from secondlook.recorded.vehicles import Ending
 from secondlook.recorded.whereabouts import Place, Whereabouts
 
@@ -225,19 +226,17 @@ class Metrics:
         return float(found.mean()) if found.size else 1.0
 
     def targets_found(self) -> BoolArray:
-        """Whether each target is found: somebody has detected it, and what is listed as a mine lies within reach of it;
-        shape (targets,)."""
-        _, missed = self.targets_met()
-        return np.asarray(~missed & self._listed_at_targets().any(axis=0)) if missed.size else missed
+        """Whether each target is found: somebody has detected it, and it is on the list of mines; shape (targets,)."""
+        return self._listed_and_found()[1]
 
-    def _listed_at_targets(self) -> BoolArray:
-        """Of everything listed as a mine which targets lie within reach; shape (listed, targets)."""
-        assert self.targets is not None
+    def _listed_and_found(self) -> tuple[BoolArray, BoolArray]:
+        """Which objects on the list of mines are targets, and which targets are found, see `matched`."""
         seen, chances = self.mine_chances()
-        listed = are_listed(chances)
-        x_m, y_m = np.array([(one.x_m, one.y_m) for one in self.targets.targets]).T
-        apart_m = np.hypot(seen.x_m[listed, np.newaxis] - x_m, seen.y_m[listed, np.newaxis] - y_m)
-        return np.asarray(apart_m <= seen.gate_m[listed, np.newaxis])
+        listed, (_, missed) = are_listed(chances), self.targets_met()
+        told = () if self.targets is None or not missed.size else self.targets.targets
+        targets_m = np.array([(one.x_m, one.y_m) for one in told], dtype=np.float64).reshape(-1, 2)
+        listed_m = np.stack([seen.x_m, seen.y_m], axis=1)[listed]
+        return matched(listed_m, seen.gate_m[listed], targets_m, ~missed)
 
     def _target_cells(self, grid: GridSpec) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """The row and column of each target's cell."""
@@ -381,7 +380,7 @@ class Metrics:
         if not risk.size:
             return {"targets": 0, "left": 0, "missed_share": None, "predicted_missed_share": None}
         assert self.map is not None
-        found, at_none = self.targets_found(), ~self._listed_at_targets().any(axis=1)
+        is_target, found = self._listed_and_found()
         area_km2 = float(self.inside.sum()) * self.map.grid.cell_area_m2 / 1e6
         return {
             "targets": risk.size,
@@ -389,7 +388,7 @@ class Metrics:
             "missed_share": float(missed.mean()),
             "predicted_missed_share": float(risk.mean()),
             "listed_share": None if missed.all() else float(found[~missed].mean()),
-            "false_listed_per_km2": float(at_none.sum()) / area_km2,
+            "false_listed_per_km2": float((~is_target).sum()) / area_km2,
         }
 
     def _strip_summary(self) -> dict[str, Any]:

@@ -257,8 +257,11 @@ class Mission(ABC):
 
     @cached_property
     def targets(self) -> list[TargetRecord]:
-        """The targets and which of them were found; none where the truth is not known."""
-        return targets(self.said(TruthTargets), self.said(TruthLook))
+        """The targets, and which of them were detected and listed; none where the truth is not known."""
+        metrics = Metrics()
+        for one in self.received(RunInfo, CoverageTile, Contact, TruthTargets, TruthLook):
+            metrics.hear(one)
+        return targets(self.said(TruthTargets), self.said(TruthLook), metrics.targets_found())
 
 
 class RecordedMission(Mission):

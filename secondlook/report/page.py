@@ -58,11 +58,12 @@ STRIP_ON_MAP = "on-map-"
 @dataclass(frozen=True)
 class TargetFigures:
     """Of a simulation: how many targets there were, how many each vehicle was the first to find, how many were missed,
-    and which share should have been missed by the risk map."""
+    how many are left, missed or not listed, and which share should have been missed by the risk map."""
 
     count: int
     found_by: dict[str, int]
     missed: int
+    left: int
     predicted_missed_share: float
 
 
@@ -170,7 +171,13 @@ def _targets(mission: RecordedMission, after: RiskMap) -> TargetFigures | None:
     counts = Counter(target.found_by for target in targets if target.found_by is not None)
     found_by = {one.vehicle: counts[one.vehicle] for one in mission.run.vehicles if counts[one.vehicle]}
     at_targets = [float(after.at(target.point.x, target.point.y)) for target in targets]
-    return TargetFigures(len(targets), found_by, len(targets) - counts.total(), statistics.fmean(at_targets))
+    return TargetFigures(
+        count=len(targets),
+        found_by=found_by,
+        missed=len(targets) - counts.total(),
+        left=sum(not target.listed for target in targets),
+        predicted_missed_share=statistics.fmean(at_targets),
+    )
 
 
 def _settings(mission: RecordedMission) -> str:

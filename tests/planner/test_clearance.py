@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -31,8 +32,14 @@ CELL_M2 = 25.0
 ALL = np.ones((8, 10), dtype=np.bool_)
 
 
+def surely(found: float) -> np.ndarray:
+    """So many mines that are listed: all for certain, but for one of which a part is expected."""
+    whole = math.floor(found)
+    return np.array([1.0] * whole + [found - whole] * (found > whole))
+
+
 def left_of(risk: float | np.ndarray, found: float, scatter: float = 0.0, place: np.ndarray = ALL) -> MinesLeft:
-    told = mines_left(np.broadcast_to(risk, ALL.shape).astype(np.float64), ALL, place, CELL_M2, found, scatter)
+    told = mines_left(np.broadcast_to(risk, ALL.shape).astype(np.float64), ALL, place, CELL_M2, surely(found), scatter)
     assert told is not None
     return told
 
@@ -57,10 +64,11 @@ def test_of_an_area_that_is_half_seen_about_as_many_are_left_as_were_found() -> 
     assert told.none == pytest.approx(0.5**20.5)
     assert told.clearance == pytest.approx(0.5)
     assert told == left_of(0.5, 20) != left_of(0.5, 21)
-    assert "reached" not in repr(told)  # hundreds of numbers
+    assert told.found == 20.0
+    assert "ed=" not in repr(told)  # hundreds of numbers are `reached` or `listed`
 
 
-@pytest.mark.parametrize(("risk", "found"), [(0.2, 40), (0.5, 3), (0.05, 0), (0.9, 12), (0.01, 200.5), (0.001, 1e7)])
+@pytest.mark.parametrize(("risk", "found"), [(0.2, 40), (0.5, 3), (0.05, 0), (0.9, 12), (0.01, 200.5), (0.001, 1e6)])
 def test_it_is_the_negative_binomial_distribution_of_scipy(risk: float, found: float) -> None:
     told, true = left_of(risk, found), negative_binomial(found + PRIOR_MINES, 1.0 - risk)
     assert (told.low, told.high) == (true.ppf(0.05), true.ppf(0.95))
@@ -70,41 +78,38 @@ def test_it_is_the_negative_binomial_distribution_of_scipy(risk: float, found: f
 
 @pytest.mark.parametrize("found", [0, 1, 12])
 def test_with_one_mine_more_more_may_be_left(found: float) -> None:
-    told = mines_left(np.full(ALL.shape, 0.5), ALL, ALL, CELL_M2, found, 0.0, prior_mines=CAUTIOUS_MINES)
+    told = mines_left(np.full(ALL.shape, 0.5), ALL, ALL, CELL_M2, surely(found), 0.0, prior_mines=CAUTIOUS_MINES)
     assert told is not None
     true = negative_binomial(found + 1, 0.5)
     assert (told.none, told.mean, told.high) == pytest.approx((true.pmf(0), true.mean(), true.ppf(0.95)))
     assert told.none < left_of(0.5, found).none
 
 
-@pytest.mark.parametrize(("scatter", "exact"), [(0.1, 1e-9), (0.3, 1e-3)])
-def test_with_scatter_it_is_a_mixture_by_nine_nodes_of_how_much_was_seen(scatter: float, exact: float) -> None:
+@pytest.mark.parametrize("scatter", [0.1, 0.3, 0.9])
+def test_with_scatter_it_is_a_mixture_by_nine_nodes_of_how_much_was_seen(scatter: float) -> None:
     west = np.broadcast_to(np.arange(10) < 3, ALL.shape)
     told = left_of(np.where(west, 0.6, 0.2), 12, scatter, place=west)
     mean, clearance, numbers = 0.0, 0.0, np.arange(200)
     reached = np.zeros(numbers.size)
     for node, weight in zip(*np.polynomial.hermite_e.hermegauss(9), strict=True):
         share = weight / math.sqrt(2 * math.pi)
-        exponent = max(1.0 + scatter * node, 1e-9)
+        exponent = math.exp(scatter * node - scatter**2 / 2)
         here, elsewhere = 0.6**exponent, 0.2**exponent
         expected = 12.5 * 3 * here / (3 * (1 - here) + 7 * (1 - elsewhere))
-        mean += share * min(expected, 1e6)
+        mean += share * expected
         clearance += share * (1 - here)
         reached += share * negative_binomial(12.5, 12.5 / (12.5 + expected)).cdf(numbers)
-    if scatter < 0.2:
-        assert told.mean == pytest.approx(mean, rel=exact)
-    assert told.clearance == pytest.approx(clearance, rel=exact)
-    assert told.none == pytest.approx(reached[0], rel=exact)
-    assert [told.chance_of_at_most(number) for number in (0, 4, 9, 25)] == pytest.approx(
-        reached[[0, 4, 9, 25]], rel=exact
-    )
+    assert told.mean == pytest.approx(mean)
+    assert told.clearance == pytest.approx(clearance)
+    assert told.none == pytest.approx(reached[0])
+    assert told.reached[[0, 4, 9, 25]] == pytest.approx(reached[[0, 4, 9, 25]])
     assert [told.low, told.high] == np.searchsorted(reached, [0.05, 0.95]).tolist()
 
 
 @pytest.mark.parametrize("scatter", [0.0, 0.3, 0.5, 0.9])
 def test_the_mean_is_that_of_the_chances_also_where_looks_may_have_seen_nothing(scatter: float) -> None:
     told = left_of(0.4, 12, scatter)
-    assert told.mean == pytest.approx((1.0 - told.reached).sum(), rel=1e-3)
+    assert told.mean == pytest.approx((1.0 - told.reached).sum())
     assert 0.0 < told.clearance < 1.0
 
 
@@ -112,7 +117,7 @@ def test_of_a_place_without_a_cell_nothing_is_left() -> None:
     told = left_of(0.5, 12, 0.1, place=~ALL)
     assert (told.mean, told.low, told.high, told.none) == (0.0, 0, 0, 1.0)
     assert told.clearance == pytest.approx(1.0)
-    assert told.at_most_with(0.0) == 0
+    assert told.chance_of_clearance(1.0) == told.clearance_with(0.9) == 1.0
 
 
 def test_where_looks_may_have_seen_nothing_at_all_a_place_that_is_surely_seen_is_no_mistake() -> None:
@@ -128,7 +133,7 @@ def test_no_more_numbers_of_mines_are_told_of_than_count() -> None:
 def test_of_an_area_of_which_a_hundredth_of_a_square_metre_was_seen_something_can_be_said() -> None:
     one = np.zeros(ALL.shape, dtype=np.bool_)
     one[2, 3] = True
-    told = mines_left(np.full(ALL.shape, 0.9), one, one, 0.1, 2.0, 0.0)
+    told = mines_left(np.full(ALL.shape, 0.9), one, one, 0.1, surely(2), 0.0)
     assert told is not None
     assert told.mean == pytest.approx(2.5 * 9)
 
@@ -149,7 +154,7 @@ def test_what_was_found_elsewhere_tells_of_a_place_and_a_place_well_seen_is_clea
 def test_a_place_may_be_smaller_than_a_square_metre() -> None:
     one = np.zeros(ALL.shape, dtype=np.bool_)
     one[0, 0] = True
-    told = mines_left(np.full(ALL.shape, 0.25), ALL, one, 0.5, 7.5, 0.0)
+    told = mines_left(np.full(ALL.shape, 0.25), ALL, one, 0.5, surely(7.5), 0.0)
     assert told is not None
     assert told.clearance == pytest.approx(0.75)
     assert told.mean == pytest.approx(8.0 / 80 / 3)
@@ -160,25 +165,84 @@ def test_where_mines_lie_denser_more_are_left() -> None:
     weights[:, :5] = 3.0
     west = np.zeros(ALL.shape, dtype=np.bool_)
     west[:, :5] = True
-    told = mines_left(np.full(ALL.shape, 0.5), ALL, west, CELL_M2, 7.5, 0.0, weights)
+    told = mines_left(np.full(ALL.shape, 0.5), ALL, west, CELL_M2, surely(7.5), 0.0, weights)
     assert told is not None
     assert told.mean == pytest.approx(8.0 * 3 / 4)
 
 
+def test_with_more_scatter_steadily_more_are_left() -> None:
+    scatters = np.arange(0.0, 1.0, 0.001)
+    steps = np.array([left_of(0.2, 24, scatter).mean for scatter in scatters])
+    assert (np.diff(steps) > 0.0).all()
+    normal = np.linspace(-8.0, 8.0, 4001)
+    for scatter in (0.0, 0.3, 0.312, 0.6):
+        missed = 0.2 ** np.exp(scatter * normal - scatter**2 / 2)
+        weights = np.exp(-(normal**2) / 2)
+        expected = 24.5 * np.average(missed / (1.0 - missed), weights=weights)
+        assert steps[np.isclose(scatters, scatter)] == pytest.approx(expected, rel=1e-4)
+
+
+def test_so_many_mines_and_more_are_told_as_one_number() -> None:
+    """Where they may be 100,000 and more: nothing is lost of the chance that there are."""
+    told = left_of(0.999, 304, 0.3)
+    assert told.mean > 3e5
+    assert (told.low, told.high) == (100_000, 100_000)
+    assert told.reached[-1] == pytest.approx(1.0)
+    assert left_of(0.995, 304, 0.3).low < left_of(0.997, 304, 0.3).low < 100_000
+
+
 @pytest.mark.parametrize(("risk", "found"), [(0.2, 40), (0.5, 3), (0.05, 0)])
-def test_the_chance_of_at_most_so_many_is_that_of_scipy(risk: float, found: float) -> None:
+def test_of_mines_that_are_found_for_certain_so_many_may_be_left_for_a_clearance(risk: float, found: int) -> None:
     told, true = left_of(risk, found), negative_binomial(found + PRIOR_MINES, 1.0 - risk)
-    for number in (0, 1, 3, 9.9, 30):
-        assert told.chance_of_at_most(number) == pytest.approx(true.cdf(math.floor(number)))
-    assert told.chance_of_at_most(-0.5) == 0.0
-    assert told.chance_of_at_most(1e9) == pytest.approx(1.0)
-    # What is summed up may end short of 1.
-    assert replace(told, reached=np.array([0.5, 0.9, 1.0 - 1e-12])).at_most_with(1.0) == 2
-    few = replace(told, reached=np.array([0.5, 0.9, 1.0]))
-    assert [few.chance_of_at_most(number) for number in (0, 1, 2, 7)] == [0.5, 0.9, 1.0, 1.0]
+    for share, may_be_left in ((1.0, 0), (0.75, found // 3), (0.5, found), (0.25, 3 * found), (0.003, 332 * found)):
+        assert told.chance_of_clearance(share) == pytest.approx(true.cdf(may_be_left))
     for chance in (0.1, 0.5, 0.9):
-        assert told.at_most_with(chance) == true.ppf(chance)
-    assert told.chance_of_at_most(told.at_most_with(1.0)) == pytest.approx(1.0)
+        most = true.ppf(chance)
+        assert told.clearance_with(chance) == pytest.approx(found / (found + most) if most else 1.0)
+
+
+def test_what_is_likely_a_mine_counts_by_its_chance_for_a_clearance() -> None:
+    """Three that are listed, with 0.9985 each: one may be left of 3 for a clearance of 75 %, none of 2 or fewer."""
+    told = mines_left(np.full(ALL.shape, 0.2), ALL, ALL, CELL_M2, np.full(3, 0.9985), 0.0)
+    assert told is not None
+    assert told.found == pytest.approx(2.9955)
+    all_three = 0.9985**3
+    expected = all_three * told.reached[1] + (1.0 - all_three) * told.reached[0]
+    assert told.chance_of_clearance(0.75) == pytest.approx(expected)
+
+
+@given(
+    listed=st.lists(st.floats(0.0, 1.0), max_size=6),
+    risk=st.floats(0.01, 0.9),
+    share=st.floats(0.01, 1.0),
+    chance=st.floats(0.01, 0.99),
+)
+def test_a_clearance_is_that_of_every_number_found_and_left(
+    listed: list[float], risk: float, share: float, chance: float
+) -> None:
+    told = mines_left(np.full(ALL.shape, risk), ALL, ALL, CELL_M2, np.array(listed), 0.0)
+    assert told is not None
+    left = np.diff(told.reached, prepend=0.0)
+    by_share: dict[float, float] = {}
+    for are_mines in product([True, False], repeat=len(listed)):
+        likely = math.prod(one if is_mine else 1.0 - one for one, is_mine in zip(listed, are_mines, strict=True))
+        for number, is_left in enumerate(left):
+            of_all = sum(are_mines) / (sum(are_mines) + number) if number else 1.0
+            by_share[of_all] = by_share.get(of_all, 0.0) + likely * is_left
+    expected = sum(likely for of_all, likely in by_share.items() if of_all >= share - 1e-12)
+    assert told.chance_of_clearance(share) == pytest.approx(expected, abs=1e-9)
+    with_chance = told.clearance_with(chance)
+    assert sum(likely for of_all, likely in by_share.items() if of_all >= with_chance - 1e-12) >= chance - 2e-9
+    assert sum(likely for of_all, likely in by_share.items() if of_all > with_chance + 1e-12) < chance + 2e-9
+
+
+def test_of_many_objects_the_sum_of_their_chances_is_told() -> None:
+    from scipy.stats import binom
+
+    told = mines_left(np.full(ALL.shape, 1e-9), ALL, ALL, CELL_M2, surely(1), 0.0, unlisted=np.full(20_000, 0.01))
+    assert told is not None
+    numbers = np.arange(150, 260)
+    assert told.reached[numbers] == pytest.approx(binom(20_000, 0.01).cdf(numbers), abs=1e-6)
 
 
 @pytest.mark.parametrize("rho", [0.0, 0.5])
@@ -193,7 +257,7 @@ def test_of_a_map_it_is_what_its_cells_tell(rho: float, of_a_part: bool) -> None
     west = np.broadcast_to(np.arange(10) < 6, ALL.shape)
     found, place = with_objects(fleet, 20), (inside & west).astype(np.float64) if of_a_part else None
     told = mines_left_by(found, inside, 0.1, place)
-    expected = mines_left(fleet.risk, inside, inside & west if of_a_part else inside, CELL_M2, 20.0, 0.1)
+    expected = mines_left(fleet.risk, inside, inside & west if of_a_part else inside, CELL_M2, surely(20), 0.1)
     cautious = mines_left_by(found, inside, 0.1, place, CAUTIOUS_MINES)
     assert told is not None
     assert expected is not None
@@ -231,7 +295,7 @@ def test_of_a_place_so_much_of_each_cell_counts_as_lies_there() -> None:
 def test_a_mine_that_is_not_listed_is_left() -> None:
     """What is left is the sum of those not seen and of those not listed, each with its own chance."""
     unlisted, half = np.array([0.3, 0.1, 0.2]), np.full(ALL.shape, 0.5)
-    told = mines_left(half, ALL, ALL, CELL_M2, 5.0, 0.0, unlisted=unlisted)
+    told = mines_left(half, ALL, ALL, CELL_M2, surely(5), 0.0, unlisted=unlisted)
     assert told is not None
     assert told.found == 5.0
     unseen = negative_binomial(5.0 + 0.6 + PRIOR_MINES, 0.5).pmf(np.arange(60))
@@ -245,7 +309,7 @@ def test_a_mine_that_is_not_listed_is_left() -> None:
     # Of 12.2 that lie there, with the prior's half, 6.1 were seen, of which 5.5 count as found.
     assert told.clearance == pytest.approx(5.5 / 12.2)
     # Where one lies a quarter within a place, and the others do not.
-    some = mines_left(half, ALL, ALL, CELL_M2, 5.0, 0.0, unlisted=unlisted, there=np.array([0.25, 0.0, 0.0]))
+    some = mines_left(half, ALL, ALL, CELL_M2, surely(5), 0.0, unlisted=unlisted, there=np.array([0.25, 0.0, 0.0]))
     assert some is not None
     assert some.none == pytest.approx(unseen[0] * 0.925)
     assert some.mean == pytest.approx(6.1 + 0.075)
@@ -255,7 +319,7 @@ def test_a_mine_that_is_not_listed_is_left() -> None:
 def test_of_what_may_be_seen_there_no_more_is_found_than_there_is() -> None:
     one = np.zeros(ALL.shape, dtype=np.bool_)
     one[0, 0] = True
-    told = mines_left(np.full(ALL.shape, 0.5), ALL, one, CELL_M2, 5.0, 0.0, unlisted=np.array([0.3]))
+    told = mines_left(np.full(ALL.shape, 0.5), ALL, one, CELL_M2, surely(5), 0.0, unlisted=np.array([0.3]))
     assert told is not None
     assert told.clearance == 0.0  # some 0.07 are expected to be seen in the cell, and 0.3 to lie there unlisted
 
@@ -270,7 +334,7 @@ def test_of_a_fleets_objects_those_count_as_found_that_are_listed_and_the_others
     assert (mines[8:] > 0.1).all()
     assert (mines[8:] < LISTED_FROM).all()
     told = mines_left_by(objects, ALL, 0.1)
-    expected = mines_left(fleet.risk, ALL, ALL, CELL_M2, 8.0, 0.1, unlisted=mines[8:])
+    expected = mines_left(fleet.risk, ALL, ALL, CELL_M2, mines[:8], 0.1, unlisted=mines[8:])
     assert told is not None
     assert expected is not None
     assert (told.found, told.mean, told.none) == pytest.approx((8.0, expected.mean, expected.none))
@@ -310,16 +374,21 @@ def test_of_several_vehicles_the_one_whose_tracks_differ_most_counts() -> None:
 
 
 def test_where_nothing_was_seen_nothing_can_be_said() -> None:
-    assert mines_left(np.ones(ALL.shape), ALL, ALL, CELL_M2, 0, 0.0) is None
-    assert mines_left(np.ones(ALL.shape), ALL, ALL, CELL_M2, 0, 0.2) is None
+    assert mines_left(np.ones(ALL.shape), ALL, ALL, CELL_M2, surely(0), 0.0) is None
+    assert mines_left(np.ones(ALL.shape), ALL, ALL, CELL_M2, surely(0), 0.2) is None
 
 
-@pytest.mark.parametrize(
-    ("found", "scatter"), [(-1.0, 0.0), (math.nan, 0.0), (3.0, -0.1), (3.0, math.inf), (math.inf, 0.1)]
-)
-def test_what_makes_no_sense_is_refused(found: float, scatter: float) -> None:
-    with pytest.raises(ValueError, match="found and scatter must be at least 0 and finite"):
-        left_of(0.5, found, scatter)
+@pytest.mark.parametrize("scatter", [-0.1, math.inf, math.nan])
+def test_a_scatter_that_makes_no_sense_is_refused(scatter: float) -> None:
+    with pytest.raises(ValueError, match="scatter must be at least 0 and finite"):
+        left_of(0.5, 3, scatter)
+
+
+@pytest.mark.parametrize("chance", [-0.1, 1.1, math.nan])
+def test_a_chance_that_is_none_is_refused(chance: float) -> None:
+    for listed, unlisted in (([0.5, chance], [0.1]), ([0.5], [chance])):
+        with pytest.raises(ValueError, match="must be a mine with a chance from 0 to 1"):
+            mines_left(np.full(ALL.shape, 0.5), ALL, ALL, CELL_M2, np.array(listed), 0.0, unlisted=np.array(unlisted))
 
 
 @given(risk=st.floats(0.001, 0.99), found=st.integers(0, 500), scatter=st.floats(0.0, 0.3), more=st.floats(1.001, 1.2))

@@ -15,8 +15,8 @@ SQUARE = Region(((0.0, 0.0), (100.0, 0.0), (100.0, 100.0), (0.0, 100.0)))
 GRID = GridSpec(SweepFrame(0.0, 0.0, 0.0), 5.0, columns=21, rows=20)  # columns at 0, 5, ... 100 m, rows at 2.5 ...
 
 
-def left_of(risk: float, found: float) -> MinesLeft:
-    told = mines_left(np.full(ALL.shape, risk), ALL, ALL, 25.0, found, 0.0)
+def left_of(risk: float, found: int) -> MinesLeft:
+    told = mines_left(np.full(ALL.shape, risk), ALL, ALL, 25.0, np.ones(found), 0.0)
     assert told is not None
     return told
 
@@ -24,26 +24,26 @@ def left_of(risk: float, found: float) -> MinesLeft:
 def test_of_100_that_are_found_25_may_be_left_for_a_clearance_of_80_percent() -> None:
     from scipy.stats import nbinom  # it takes half a second to import
 
-    left, true = left_of(0.15, 100.0), nbinom(100.0 + PRIOR_MINES, 0.85)
+    left, true = left_of(0.15, 100), nbinom(100.0 + PRIOR_MINES, 0.85)
     goal = Goal(0.8, 0.9)
     assert goal.chance_now(left) == pytest.approx(true.cdf(25))
     assert goal.is_reached(left)
     assert not Goal(0.8, float(true.cdf(25)) + 0.001).is_reached(left)
     # With 90 % no more than so many are left, so that of all so many are found.
-    assert goal.cleared_with(left) == pytest.approx(100.0 / (100.0 + true.ppf(0.9)))
+    assert left.clearance_with(0.9) == pytest.approx(100.0 / (100.0 + true.ppf(0.9)))
     assert goal.words_now(left) == f"the chance is {true.cdf(25):.3f}, and with 0.9 the clearance is 0.806"
     assert goal.words == "a clearance of 0.8 with a chance of 0.9"
 
 
 @pytest.mark.parametrize("last_bits", [-1e-13, 0.0, 1e-13])
 def test_the_last_bits_of_a_chance_decide_nothing(last_bits: float) -> None:
-    left = MinesLeft(10.0, 0.1, 0, 1, 0.9, 0.99, np.array([0.9 + last_bits, 1.0]))
+    left = MinesLeft(0.1, 0, 1, 0.9, 0.99, np.array([0.9 + last_bits, 1.0]), np.ones(10))
     assert Goal(1.0, 0.9).is_reached(left)
     assert not Goal(1.0, 0.900001).is_reached(left)
 
 
 def test_none_is_left_with_the_chance_of_0() -> None:
-    left = left_of(0.001, 10.0)
+    left = left_of(0.001, 10)
     goal = Goal(1.0, 0.95)
     assert goal.chance_now(left) == pytest.approx(0.999**10.5)
     assert goal.is_reached(left)
@@ -52,14 +52,14 @@ def test_none_is_left_with_the_chance_of_0() -> None:
 
 
 def test_where_nothing_was_found_and_much_was_seen_a_clearance_is_that_none_is_left() -> None:
-    left = left_of(0.1, 0.0)
+    left = left_of(0.1, 0)
     assert Goal(0.9, 0.5).chance_now(left) == Goal(1.0, 0.5).chance_now(left) == pytest.approx(0.9**0.5)
-    assert Goal(0.9, 0.9).cleared_with(left) == 1.0
+    assert left.clearance_with(0.9) == 1.0
 
 
 def test_where_nothing_was_seen_nothing_is_reached() -> None:
     goal = Goal(0.5, 0.1)
-    assert (goal.chance_now(None), goal.is_reached(None), goal.cleared_with(None)) == (0.0, False, 0.0)
+    assert (goal.chance_now(None), goal.is_reached(None)) == (0.0, False)
     assert goal.words_now(None) == "nothing was seen"
 
 
@@ -71,7 +71,7 @@ def test_a_lane_has_so_much_of_each_cell_as_lies_within_half_its_width() -> None
     goal = goal_of_lane(lane, 0.05)
     np.testing.assert_array_equal(goal.place(SQUARE, GRID), expected)
     assert Goal(0.5, 0.5).place(SQUARE, GRID) is None
-    left = left_of(0.001, 10.0)
+    left = left_of(0.001, 10)
     assert goal.is_reached(left)
     assert not goal_of_lane(lane, 0.005).is_reached(left)
     assert goal.words == "a risk of at most 0.05 that a mine is left in the lane"

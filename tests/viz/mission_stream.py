@@ -75,7 +75,7 @@ TURN_S = 70
 REPORT_EVERY_S = 10
 PATCHES = ((330.0, 210.0, 60.0), (640.0, 120.0, 75.0))  # across, along, radius of badly seen seabed (m)
 STRIP_WIDTH_M = 60.0
-VIEWS = 8
+VIEWS = 9
 """That `viz/blueprint.py` lays out for this mission."""
 
 

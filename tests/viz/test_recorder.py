@@ -285,11 +285,9 @@ def test_cells_outside_the_area_count_for_nothing(messages: list[Received], reco
 
 
 def test_mines_are_those_that_contacts_and_map_tell(messages: list[Received], recording: Path) -> None:
-    drawn = {
-        name: rows(recording, f"/mines/{name}", "Scalars:scalars")
-        for name in ("found", "left", "left_low", "left_high")
-    }
-    times_ms = [time_ms for time_ms, _ in drawn["found"]]
+    paths = (*(f"mines/{name}" for name in ("found", "left", "left_low", "left_high")), "clearance/share")
+    drawn = {name: rows(recording, f"/{name}", "Scalars:scalars") for name in (*paths, "clearance/none_left")}
+    times_ms = [time_ms for time_ms, _ in drawn["mines/found"]]
     first_ms, last_ms = of(messages, CoverageTile)[0][0], messages[-1].header.sent_ms
     assert times_ms == [*range(first_ms - first_ms % 120_000 + 120_000, last_ms, 120_000), last_ms]
     for at_ms, until_ms in ((times_ms[3], times_ms[3] - 1), (last_ms, last_ms)):
@@ -301,10 +299,12 @@ def test_mines_are_those_that_contacts_and_map_tell(messages: list[Received], re
         assert left is not None
         values = {name: dict(row)[at_ms][0] for name, row in drawn.items()}
         assert values == {
-            "found": pytest.approx(left.found),
-            "left": pytest.approx(left.mean),
-            "left_low": left.low,
-            "left_high": left.high,
+            "mines/found": pytest.approx(left.found),
+            "mines/left": pytest.approx(left.mean),
+            "mines/left_low": left.low,
+            "mines/left_high": left.high,
+            "clearance/share": pytest.approx(left.clearance),
+            "clearance/none_left": pytest.approx(left.none),
         }
 
 
@@ -361,8 +361,8 @@ def test_the_log_names_who_speaks(recording: Path) -> None:
 def test_entities_are_known_and_looks_are_left_out(recording: Path) -> None:
     roots = {path.split("/")[1] for path in entities(recording)}
     assert roots == {
-        "activity", "area", "contacts", "curve", "fleet", "flown", "hotspots", "log", "metrics", "mines", "plan",
-        "ranges",
+        "activity", "area", "clearance", "contacts", "curve", "fleet", "flown", "hotspots", "log", "metrics", "mines",
+        "plan", "ranges",
         "strips", "tasks", "truth",
     }  # fmt: skip
     assert timelines(recording) == {"sim_time"}

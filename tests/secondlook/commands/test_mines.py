@@ -13,10 +13,11 @@ import secondlook
 from planner.clearance import MinesLeft
 
 
-def risk(left: MinesLeft | None) -> str:
+def risk(left: MinesLeft | None, at_least: str = "") -> str:
     assert left is not None
     assert 0.0 < left.none < 1.0
-    return f"the risk that one is: {1.0 - left.none:.1%}\n"
+    cleared = f"the clearance is {left.clearance:.0%}; none is left with {left.none:.1%}"
+    return f"; {cleared}, and the risk that one is: {at_least}{1.0 - left.none:.1%}\n"
 
 
 def test_of_the_area_of_a_polygon_and_of_a_lane(called: Call, brief_run: Path) -> None:
@@ -24,16 +25,14 @@ def test_of_the_area_of_a_polygon_and_of_a_lane(called: Call, brief_run: Path) -
     left = mission.mines_left()
     assert left is not None
     assert left.mean > 10.0
-    words = f"in the area about {left.mean:.0f} mines are left, {left.low} to {left.high} with 90 %; "
+    words = f"in the area about {left.mean:.0f} mines are left, {left.low} to {left.high} with 90 %"
     told = called("mines", str(brief_run))
     assert (told.code, told.out) == (0, words + risk(left))
 
     small = mission.mines_left(shapely.box(10, 20, 12, 22))
     assert small is not None
     told = called("mines", str(brief_run), "--polygon", "10,20 12,20 12,22 10,22")
-    assert (
-        told.out == f"in the polygon about {small.mean:.2f} mines are left, 0 to {small.high} with 90 %; {risk(small)}"
-    )
+    assert told.out == f"in the polygon about {small.mean:.2f} mines are left, 0 to {small.high} with 90 %{risk(small)}"
 
     corner = shapely.box(10, 20, 70, 60)
     told = called("mines", str(brief_run), "--polygon", "10,20 70,20 70,60 10,60")
@@ -47,9 +46,12 @@ def test_of_the_area_of_a_polygon_and_of_a_lane(called: Call, brief_run: Path) -
 
 
 def test_of_what_was_not_to_be_surveyed_it_says_so(called: Call, brief_run: Path) -> None:
-    east_m, north_m = secondlook.load(brief_run).area.bounds[2:]
+    mission = secondlook.load(brief_run)
+    east_m, north_m = mission.area.bounds[2:]
     beyond = f"{east_m - 30},0 {east_m + 10},0 {east_m + 10},{north_m} {east_m - 30},{north_m}"
     told = called("mines", str(brief_run), "--polygon", beyond)
+    left = mission.mines_left(shapely.box(east_m - 30, 0, east_m + 10, north_m))
+    assert told.out.splitlines(keepends=True)[0].endswith(risk(left, "at least "))
     assert told.out.splitlines()[1] == "of the polygon 75% was to be surveyed; of the rest nothing is known"
 
 

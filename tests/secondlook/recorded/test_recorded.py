@@ -166,8 +166,7 @@ def test_what_is_truly_found_somewhere_is_told_by_the_targets_places(mission: Re
     for one in mission.messages():
         metrics.hear(one)
     for target in mission.targets:
-        found = 0.0 if target.found_by is None else 1.0
-        assert metrics.truly_found(target.point.buffer(0.01)) == found
+        assert metrics.truly_found(target.point.buffer(0.01)) == float(target.listed)
         ring = target.point.buffer(1.0).difference(target.point.buffer(0.5))
         if not any(ring.intersects(other.point) for other in mission.targets):
             assert metrics.truly_found(ring) == 1.0  # nothing lies there
@@ -247,6 +246,8 @@ def test_strips_hotspots_and_targets_are_those_of_the_summary(
     assert missed / len(targets) == summary["truth"]["missed_share"]
     assert all((target.found_by is None) == (target.found_s is None) for target in targets)
     assert all(shapely.covers(mission.area, target.point) for target in targets)
+    assert sum(not target.listed for target in targets) == summary["truth"]["left"] >= missed
+    assert not any(target.listed for target in targets if target.found_by is None)
 
 
 def heard(topic: Topic, sender: str, t_s: float, message: M, *, number: int = 0) -> Received[M]:
