@@ -1,4 +1,5 @@
-"""Whether a mission is the same on every processor: whole missions, with all that numpy makes of this one and without.
+"""Whether a mission is the same on every processor: whole missions, with all that numpy and the C library make of this
+one and without.
 
 python -m bench.processors [--scenarios a,b] [--seed N]
 
@@ -29,6 +30,8 @@ BUNDLED = [name for name in scenario_names() if name != "armada"]
 """All but one that takes a quarter of an hour."""
 NOT_EVERYWHERE = " ".join(np.show_config(mode="dicts")["SIMD Extensions"].get("found", ()))
 """What numpy makes use of that not every processor has."""
+PLAIN_LIBRARY = "glibc.cpu.hwcaps=-AVX,-AVX2,-AVX512F,-FMA,-FMA4"
+"""Has the C library work out `exp`, `sin` and the like as on a processor that has none of these."""
 ERRING = tuple(f"vehicles.{one}.position_error_m=10" for one in BOTH)
 ODD: tuple[Case, ...] = (
     ("tellaro", ("targets.count=20", CLUTTER, *map(FALSE_ALARMS.format, BOTH))),
@@ -42,11 +45,11 @@ ODD: tuple[Case, ...] = (
 def digest(case: Case, seed: int, without: str) -> str:
     """That of a mission, flown in a process that does without some of what the processor has."""
     scenario, overrides = case
-    environment = os.environ | ({"NPY_DISABLE_CPU_FEATURES": without} if without else {})
+    less = {"NPY_DISABLE_CPU_FEATURES": without, "GLIBC_TUNABLES": PLAIN_LIBRARY} if without else {}
     with tempfile.TemporaryDirectory() as folder:
         words = ["run", scenario, "--bus", "local", "--no-record", "--seed", str(seed), "--out", folder]
         command = [sys.executable, "-P", "-c", PROGRAM, *words, *as_options(overrides)]
-        subprocess.run(command, check=True, env=environment, stdout=subprocess.DEVNULL)
+        subprocess.run(command, check=True, env=os.environ | less, stdout=subprocess.DEVNULL)
         return str(json.loads((Path(folder) / "summary.json").read_text())["digest"])
 
 

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import platform
+import subprocess
+import sys
+
 import pytest
 
 from bench import processors
@@ -47,3 +52,16 @@ def test_a_mission_flown_with_less_has_its_digest() -> None:
     with_all, with_less = (processors.digest(brief, 3, without) for without in ("", processors.NOT_EVERYWHERE))
     assert len(with_all) == 64
     assert with_all == with_less != processors.digest(brief, 4, "")
+
+
+def test_the_c_library_does_with_less_as_well() -> None:
+    """It works last bits out otherwise then, as it would on another processor."""
+    command = [sys.executable, "-c", "import math; print(*[math.sin(number / 7) for number in range(7000)])"]
+    plain = os.environ | {"GLIBC_TUNABLES": processors.PLAIN_LIBRARY}
+    one, other = (
+        [float(value) for value in subprocess.run(command, env=env, capture_output=True, check=True).stdout.split()]
+        for env in (os.environ, plain)
+    )
+    if platform.libc_ver()[0] == "glibc" and "X86_V3" in processors.NOT_EVERYWHERE:
+        assert one != other
+    assert one == pytest.approx(other, rel=1e-12)

@@ -4,6 +4,7 @@ that."""
 from __future__ import annotations
 
 import json
+import math
 from collections import Counter
 from pathlib import Path
 from statistics import fmean
@@ -77,6 +78,26 @@ def test_what_pages_say_beside_tables_is_what_is_kept() -> None:
     errors = by(kept("position-errors")["rows"], ("position_error_m",), "true.mean")["20",]
     too_little = fmean(row["true.mean"] - row["risk.mean"] for row in errors)
     assert f"at 20 m it tells {too_little:.3f} too little" in words_of("docs/faults.md")
+
+
+def test_what_a_page_says_beside_the_table_of_contacts_is_what_is_kept() -> None:
+    page = words_of("docs/clearance.md")
+    missions = by(kept("contacts")["rows"], clearance_tables.CONTACT_COLUMNS, "truth.listed_share")
+    alone, asked = missions["clear", "false", "-", "-"], missions["clear", "true", "-", "-"]
+    means = {
+        name: [fmean(row[name] for row in rows) for rows in (asked, alone)]
+        for name in ("truth.listed_share", "truth.false_listed_per_km2", "risk.mean")
+    }
+    (listed, not_so), (false, more), (risk, less) = means.values()
+    assert false < more
+    told = f"{listed:.2f} are listed and not {not_so:.2f}, and less falsely; they cost {risk - less:.3f} of residual"
+    assert told in page
+    for name, words, at in (
+        ("truth.listed_share", "shares are known to within {:.2f}", 100),
+        ("truth.false_listed_per_km2", "false ones to within {:.1f} a km²", 10),
+    ):
+        ends = [interval_of_mean(np.array([row[name] for row in rows])) for rows in missions.values()]
+        assert words.format(math.ceil(max(high - low for low, high in ends) / 2 * at) / at) in page
 
 
 def test_what_a_mission_is_shown_to_say_of_the_mines_left_is_what_it_says(tmp_path: Path) -> None:
