@@ -175,8 +175,12 @@ class SweepFolder:
         """Writes what was added since the last time. Raises CannotWriteError."""
         if self._rows:
             rows, self._rows = self._rows, []
-            (self.path / ROWS).mkdir(exist_ok=True)
-            _write(self.path / ROWS / f"{self._next:06}.parquet", pa.Table.from_pylist(rows, self.schema))
+            folder = self.path / ROWS
+            try:
+                folder.mkdir(exist_ok=True)
+            except OSError as error:
+                raise CannotWriteError(folder, error) from error
+            _write(folder / f"{self._next:06}.parquet", pa.Table.from_pylist(rows, self.schema))
             self._next += 1
 
     def join(self) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
+import shutil
 from collections.abc import Callable
 from concurrent.futures import Executor, Future
 from pathlib import Path
@@ -256,6 +257,16 @@ class TestRefusedFolder:
                 fly(plan(), tmp_path)
         assert len(load_sweep(tmp_path).table) == 4
         assert len(fly(plan(), tmp_path).flown) == 12
+
+    def test_one_that_is_taken_away_meanwhile_is_told(self, tmp_path: Path, each_row_a_file: None) -> None:
+        folder = tmp_path / "sweep"
+
+        def take_away(done: int, failed: int) -> None:
+            if done == 3:
+                shutil.rmtree(folder)
+
+        with pytest.raises(CannotWriteError, match=r"rows: No such file or directory; must be"):
+            fly_missing(plan(), folder, Engine(Here(), lambda: 1), take_away, flies=swept.flown)
 
 
 @pytest.fixture
