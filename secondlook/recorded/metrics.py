@@ -377,18 +377,17 @@ class Metrics:
 
     def _truth_summary(self) -> dict[str, Any]:
         risk, missed = self.targets_met()
-        if not risk.size:
-            return {"targets": 0, "left": 0, "missed_share": None, "predicted_missed_share": None}
-        assert self.map is not None
         is_target, found = self._listed_and_found()
-        area_km2 = float(self.inside.sum()) * self.map.grid.cell_area_m2 / 1e6
+        falsely: float | None = None
+        if self.map is not None and self.targets is not None:
+            falsely = float((~is_target).sum()) / (float(self.inside.sum()) * self.map.grid.cell_area_m2 / 1e6)
         return {
             "targets": risk.size,
             "left": int((~found).sum()),
-            "missed_share": float(missed.mean()),
-            "predicted_missed_share": float(risk.mean()),
+            "missed_share": float(missed.mean()) if risk.size else None,
+            "predicted_missed_share": float(risk.mean()) if risk.size else None,
             "listed_share": None if missed.all() else float(found[~missed].mean()),
-            "false_listed_per_km2": float((~is_target).sum()) / area_km2,
+            "false_listed_per_km2": falsely,
         }
 
     def _strip_summary(self) -> dict[str, Any]:

@@ -374,7 +374,8 @@ class TestRisk:
         assert (metrics.now_ms, metrics.misfits) == (0, 0)
         assert (summary["risk"], summary["risk_primary_alone"], summary["risk_at"]) == (None, None, [])
         assert summary["primary_s"] is None
-        assert summary["truth"] == {"targets": 0, "left": 0, "missed_share": None, "predicted_missed_share": None}
+        shares = dict.fromkeys(("missed_share", "predicted_missed_share", "listed_share", "false_listed_per_km2"))
+        assert summary["truth"] == {"targets": 0, "left": 0, **shares}
         assert summary["mines"] is None
 
     def test_contacts_of_one_thing_are_one_object_and_tell_how_many_are_left(self) -> None:
@@ -487,7 +488,13 @@ class TestTruth:
     def test_without_targets_there_are_no_shares(self) -> None:
         stream = begun()
         stream.say(0, "world/truth/targets", TruthTargets(()))
-        assert stream.metrics.summary()["truth"]["missed_share"] is None
+        stream.tile(1, PRIMARY, [[50] * 5] * 2)
+        stream.say(2, f"agent/{PRIMARY}/contact/1", Contact(13.0, 15.0, 0.2, 0.9, 1))
+        shares = {"missed_share": None, "predicted_missed_share": None, "listed_share": None}
+        # What is listed is no mine, on 10 cells of 100 m2.
+        assert stream.metrics.summary()["truth"] == {
+            "targets": 0, "left": 0, **shares, "false_listed_per_km2": pytest.approx(1000)
+        }  # fmt: skip
 
 
 class TestStrips:
