@@ -7,10 +7,11 @@ clearance in Washburn and Kress, Combat Modeling; the gamma-Poisson pair is that
 
 A mine is found if it is on the list of mines. What was detected and is not listed, as it is more likely something else,
 may be a mine all the same: each adds its chance to those left (the number of them follows a Poisson binomial
-distribution), and all that was detected tells of the density.
+distribution), and all that was detected tells of the density. How many of it are mines is not sure, which makes the
+answer wider: the gamma distribution is the one with the variance that the number left has with that.
 
-That P(y) is known by few tracks alone makes the answer wider: all that looks have seen is taken for so much more or
-less of it, by a log-normal distribution of mean 1, as the tracks differ from each other.
+That P(y) is known by few tracks alone makes it wider, too: all that looks have seen is taken for so much more or less
+of it, by a log-normal distribution of mean 1, as the tracks differ from each other.
 """
 
 from __future__ import annotations
@@ -21,9 +22,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from planner.contacts import ObjectsOnMap, are_listed
+from planner.contacts import ObjectsOnMap, SeenObjects, are_listed
 from planner.fleet_map import EVERYWHERE
-from planner.types import BoolArray, DetectionCurve, FloatArray
+from planner.types import BoolArray, DetectionCurve, FloatArray, GridSpec
 
 PRIOR_MINES = 0.5
 """The gamma prior's shape, at a rate of 0: Jeffreys' prior of a Poisson process, half a mine found at any density."""
@@ -32,21 +33,38 @@ CAUTIOUS_MINES = 1.0
 Poisson process' mean that holds at any density (F. Garwood, Biometrika 28, 1936)."""
 UNKNOWN_SCATTER = 0.3
 """Taken for the spread of P(y) between tracks where fewer than two are known."""
-NODES = 9
+NODES = np.linspace(-6.0, 6.0, 31)
+"""Of a standard normal distribution, near enough to each other that sums over them are integrals."""
+SHARES = np.exp(-(NODES**2) / 2.0) / np.exp(-(NODES**2) / 2.0).sum()
+MOST_SCATTER = 1.0
 MOST_MINES = 100_000
 """So many and more are told as one number."""
 LOW, HIGH = 0.05, 0.95
 DECIMALS = 9
 """Of a chance or a number of mines: last bits hang on the processor."""
-NOTHING = np.zeros(0)
+
+
+@dataclass(frozen=True)
+class Detected:
+    """What was detected, as it counts: with which chance each object is a mine, in [0, 1], whether it is listed as one,
+    and how much of it lies in the place that is asked for, [0, 1]; shape (objects,). Raises ValueError for a chance
+    that is none."""
+
+    mines: FloatArray
+    is_listed: BoolArray
+    there: FloatArray | float = 1.0
+
+    def __post_init__(self) -> None:
+        if not ((self.mines >= 0.0) & (self.mines <= 1.0)).all():  # a NaN is not, either
+            raise ValueError("an object must be a mine with a chance from 0 to 1")
 
 
 @dataclass(frozen=True)
 class MinesLeft:
     """How many mines are left somewhere: the `mean`, the 90 % interval from `low` to `high`, and the chance that there
-    is `none`. `clearance`: the share of all mines there that is expected to have been found, [0, 1]. `reached`: the
-    chances of at most 0, 1, 2 and so on. `listed`: the chance to be a mine of each object that counts as found, there
-    or elsewhere."""
+    is `none`. `clearance`: the chance that a mine which lies there has been found, [0, 1]; it tells of the search, not
+    of what happened to be found there. `reached`: the chances of at most 0, 1, 2 and so on. `listed`: with which chance
+    each object that counts as found is a mine and lies there."""
 
     mean: float
     low: int
@@ -58,30 +76,34 @@ class MinesLeft:
 
     @property
     def found(self) -> float:
-        """How many are expected to be mines of all that is listed as one."""
+        """How many mines there are expected to be listed."""
         return float(self.listed.sum())
 
     def chance_of_clearance(self, share: float) -> float:
-        """With which chance at least so large a share, in (0, 1], of all mines is found: of those listed that are mines
-        and of those left, which may be few or many each for themselves. Of no mine at all everything is found."""
-        found = _poisson_binomial(self.listed)
-        may_be_left = np.floor(np.round(np.arange(len(found)) * (1.0 / share - 1.0), DECIMALS))
-        at = np.minimum(may_be_left, len(self.reached) - 1.0).astype(np.intp)
-        return float((found * self.reached[at]).sum())
+        """With which chance at least so large a share of all mines there is found: of those listed that are mines and
+        of those left, each taken to be few or many by itself. Of no mine at all everything is found. Raises ValueError
+        for a share that is not in (0, 1]."""
+        if not 0.0 < share <= 1.0:
+            raise ValueError(f"a share must be above 0 and at most 1, not {share}")
+        return self._chance(share, _poisson_binomial(self.listed))
 
     def clearance_with(self, chance: float) -> float:
-        """The largest share of which `chance_of_clearance` tells at least this chance, in (0, 1)."""
-        found, left = _poisson_binomial(self.listed), np.diff(self.reached, prepend=0.0)
-        some, others = np.flatnonzero(found > NEVER), np.flatnonzero(left > NEVER)
-        all_there = np.maximum(some[:, np.newaxis] + others, 1)
-        shares = np.where(others == 0, 1.0, some[:, np.newaxis] / all_there).ravel()
-        order = np.argsort(-shares, kind="stable")
-        chances = np.outer(found[some], left[others]).ravel()[order].cumsum()
-        at = int(np.searchsorted(np.round(chances, DECIMALS), chance))
-        return float(shares[order[min(at, len(order) - 1)]])
+        """The largest share of which `chance_of_clearance` tells at least this chance, in (0, 1); to 9 decimals, and 0
+        where it tells it of none."""
+        found = _poisson_binomial(self.listed)
+        low, high = 0.0, 1.0 + 2.0**-30
+        while high - low > 2.0**-31:  # of `low` it is told, of `high` it is not
+            share = (low + high) / 2.0
+            if share <= 1.0 and round(self._chance(share, found), DECIMALS) >= chance:
+                low = share
+            else:
+                high = share
+        return round(low, DECIMALS)
 
-
-NEVER = 1e-12  # how likely it is that an unlikely number counts for nothing
+    def _chance(self, share: float, found: FloatArray) -> float:
+        may_be_left = np.floor(np.round(np.arange(len(found)) * (1.0 / share - 1.0), DECIMALS))
+        at = np.minimum(may_be_left, len(self.reached) - 1.0).astype(np.intp)
+        return min(1.0, float((found * self.reached[at]).sum()))
 
 
 def mines_left(
@@ -89,55 +111,57 @@ def mines_left(
     searched: BoolArray,
     place: BoolArray,
     cell_area_m2: float,
-    listed: FloatArray,
+    detected: Detected,
     scatter: float,
     weights: FloatArray | float = 1.0,
     prior_mines: float = PRIOR_MINES,
-    unlisted: FloatArray = NOTHING,
-    there: FloatArray | float = 1.0,
 ) -> MinesLeft | None:
-    """The mines left in the cells of `place`, given what was found in those that were `searched`; None where nothing
-    was seen, and nothing can be said.
+    """The mines left in the cells of `place`, given what was `detected` in those that were `searched`; None where
+    nothing was seen, and nothing can be said.
 
-    `risk`: residual risk by cell, in [0, 1]. `listed`: the chance to be a mine, in [0, 1], of each object that counts
-    as found, shape (objects,); `unlisted`: the same of each that was detected and does not; `there`: how much of each
-    of these lies in the place, [0, 1]. `scatter`: relative standard deviation of what looks are taken to have seen, see
-    `scatter_of`. `weights`: how much denser mines lie in some cells than in others. `prior_mines`: see PRIOR_MINES.
+    `risk`: residual risk by cell, in [0, 1]. `scatter`: relative standard deviation of what looks are taken to have
+    seen, see `scatter_of`, 0 to MOST_SCATTER. `weights`: how much denser mines lie in some cells than in others.
+    `prior_mines`: see PRIOR_MINES.
 
-    Raises ValueError for a chance that is none, and for a scatter that is negative or not finite.
+    Raises ValueError for a scatter or a risk out of range.
     """
-    if not 0.0 <= scatter < math.inf:
-        raise ValueError(f"scatter must be at least 0 and finite, not {scatter}")
-    if not all(((one >= 0.0) & (one <= 1.0)).all() for one in (listed, unlisted)):  # a NaN is not, either
-        raise ValueError("what is listed, or is not, must be a mine with a chance from 0 to 1")
-    nodes, shares = np.polynomial.hermite_e.hermegauss(NODES)
-    exponents = np.exp(scatter * nodes - scatter**2 / 2.0)
-    chances, mean, cleared = np.zeros(1), 0.0, 0.0
-    unlisted_there = unlisted * there
-    shape, unlisted_left = float(listed.sum() + unlisted.sum()) + prior_mines, float(unlisted_there.sum())
+    if not 0.0 <= scatter <= MOST_SCATTER:
+        raise ValueError(f"scatter must be from 0 to {MOST_SCATTER:g}, not {scatter}")
+    if not ((risk >= 0.0) & (risk <= 1.0)).all():
+        raise ValueError("risk must be from 0 to 1")
+    mines, listed, there = detected.mines, detected.is_listed, np.broadcast_to(detected.there, detected.mines.shape)
+    unlisted_there = (mines * there)[~listed]
+    expected_mines = float(mines.sum()) + prior_mines
+    unsure, unsure_left = float((mines * (1.0 - mines)).sum()), float((mines * (1.0 - mines) * there)[~listed].sum())
     area = np.broadcast_to(np.asarray(weights, dtype=np.float64) * cell_area_m2, risk.shape)
     with np.errstate(divide="ignore"):
         logs = np.log(risk)
-    for exponent, share in zip(exponents.tolist(), (shares / shares.sum()).tolist(), strict=True):
+    chances, mean, detects = np.zeros(1), 0.0, 0.0
+    exponents = np.exp(scatter * NODES - scatter**2 / 2.0) if scatter > 0.0 else np.ones(1)
+    shares = SHARES if scatter > 0.0 else np.ones(1)
+    for exponent, share in zip(exponents.tolist(), shares.tolist(), strict=True):
         missed_m2, seen_m2 = np.exp(exponent * logs) * area, -np.expm1(exponent * logs) * area
         searched_m2 = float(seen_m2[searched].sum())
         if searched_m2 <= 0.0:
             return None
-        expected = shape * float(missed_m2[place].sum()) / searched_m2
-        chances = _sum(chances, share * _negative_binomial(shape, expected))
-        mean += share * expected
-        detected = shape * float(seen_m2[place].sum()) / searched_m2
-        all_there = detected + expected
-        cleared += share * (max(0.0, detected - unlisted_left) / all_there if all_there > 0.0 else 1.0)
+        missed_there_m2, seen_there_m2 = float(missed_m2[place].sum()), float(seen_m2[place].sum())
+        by_one = missed_there_m2 / searched_m2  # so many are left for each that was detected
+        # How many were detected is not sure, and each that is unlisted is left as well as those that it tells of.
+        spread = expected_mines + unsure + (2.0 * unsure_left / by_one if by_one > 0.0 else 0.0)
+        chances = _sum(chances, share * _negative_binomial(expected_mines**2 / spread, by_one * expected_mines))
+        mean += share * by_one * expected_mines
+        there_m2 = seen_there_m2 + missed_there_m2
+        detects += share * (seen_there_m2 / there_m2 if there_m2 > 0.0 else 1.0)
     reached = np.minimum(np.convolve(chances, _poisson_binomial(unlisted_there)).cumsum(), 1.0)
+    lists = (float(mines[listed].sum()) + prior_mines) / expected_mines
     return MinesLeft(
-        mean=mean + unlisted_left,
+        mean=mean + float(unlisted_there.sum()),
         low=int(np.searchsorted(reached, LOW)),
         high=int(np.searchsorted(reached, HIGH)),
         none=float(reached[0]),
-        clearance=cleared,
+        clearance=min(1.0, detects) * lists,
         reached=reached,
-        listed=listed,
+        listed=(mines * there)[listed],
     )
 
 
@@ -149,16 +173,17 @@ def mines_left_by(
     prior_mines: float = PRIOR_MINES,
 ) -> MinesLeft | None:
     """The same by what a fleet has detected and by its map, of the area's cells, `inside`, or of a `place`, so much of
-    each cell, 0 or more; from the number of cells that have each level, as there are few levels and many cells. An
-    object lies in a place by as much as its cell does. None where there is no map yet."""
+    each cell, 0 or more; from the number of cells that have each level, as there are few levels and many cells. Objects
+    count that lie in the area as far as one can tell; in a place each by as much as its cell does. None where there is
+    no map yet."""
     map_ = objects.map
     if map_ is None:
         return None
     seen, chances = objects.known()
-    mines, there = chances[:, 0], np.ones(seen.x_m.shape)
-    is_listed = are_listed(mines)
+    within = _lie_within(seen, inside, map_.grid)
+    mines, there = chances[within, 0], np.ones(int(within.sum()))
     if place is not None:
-        rows, columns = map_.grid.cells_of(seen.x_m, seen.y_m)
+        rows, columns = map_.grid.cells_of(seen.x_m[within], seen.y_m[within])
         there = place[np.clip(rows, 0, map_.grid.rows - 1), np.clip(columns, 0, map_.grid.columns - 1)]
         there = np.minimum(there, 1.0)
     levels, risk = map_.levels_within(EVERYWHERE, map_.layers)
@@ -169,10 +194,19 @@ def mines_left_by(
         weights = np.concatenate([weights, np.bincount(levels[some], place[some], minlength=risk.size)])
         risk, searched = np.tile(risk, 2), np.repeat([True, False], risk.size)
         in_place = ~searched
-    return mines_left(
-        *(risk, searched, in_place, map_.grid.cell_area_m2, mines[is_listed], scatter),
-        *(weights, prior_mines, mines[~is_listed], there[~is_listed]),
-    )
+    detected = Detected(mines, are_listed(mines), there)
+    return mines_left(risk, searched, in_place, map_.grid.cell_area_m2, detected, scatter, weights, prior_mines)
+
+
+def _lie_within(seen: SeenObjects, inside: BoolArray, grid: GridSpec) -> BoolArray:
+    """Which objects lie in the area, or no farther from it than one may be mistaken; shape (objects,)."""
+    rows, columns = grid.cells_of(seen.x_m, seen.y_m)
+    reach = np.ceil(seen.gate_m / grid.cell_m).astype(np.intp)
+    found = []
+    for row, column, by in zip(rows.tolist(), columns.tolist(), reach.tolist(), strict=True):
+        low, high, west, east = (max(0, at) for at in (row - by, row + by + 1, column - by, column + by + 1))
+        found.append(bool(inside[low:high, west:east].any()))
+    return np.array(found, dtype=np.bool_)
 
 
 def scatter_of_all(vehicles: Iterable[Sequence[DetectionCurve]]) -> float:
@@ -206,14 +240,10 @@ def _negative_binomial(shape: float, mean: float) -> FloatArray:
 def _poisson_binomial(chances: FloatArray) -> FloatArray:
     """The chances that 0, 1, 2 and so on of some things are so, each with its own chance."""
     unsure = chances[(chances > 0.0) & (chances < 1.0)]
-    most = min(len(unsure), math.ceil(unsure.sum() + 12.0 * math.sqrt((unsure * (1.0 - unsure)).sum()) + 40.0))
-    numbers = np.zeros(1 + most)
-    numbers[0] = 1.0
-    for chance in unsure.tolist():
-        more = numbers[:-1] * chance
-        numbers *= 1.0 - chance
-        numbers[1:] += more
-    return np.concatenate([np.zeros(int((chances >= 1.0).sum())), numbers])
+    rows = [np.array([1.0 - one, one]) for one in unsure.tolist()] or [np.ones(1)]
+    while len(rows) > 1:  # by pairs, and pairs of these: many small sums are dear
+        rows = [np.convolve(*pair) for pair in zip(rows[::2], rows[1::2], strict=False)] + rows[len(rows) // 2 * 2 :]
+    return np.concatenate([np.zeros(int((chances >= 1.0).sum())), rows[0]])
 
 
 def _sum(one: FloatArray, other: FloatArray) -> FloatArray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -68,11 +69,16 @@ class Goal:
             return "nothing was seen"
         now = self.chance_now(left)
         if self.lane is not None:
-            return f"the risk is {1.0 - now:.3f}"
+            return f"the risk is {1.0 - _told(now):.3f}"
         if self.clearance == 1.0:
-            return f"the chance is {now:.3f}"
+            return f"the chance is {_told(now):.3f}"
         cleared = left.clearance_with(self.chance)
-        return f"the chance is {now:.3f}, and with {self.chance:.3g} the clearance is {cleared:.3f}"
+        return f"the chance is {_told(now):.3f}, and with {self.chance:.3g} the clearance is {_told(cleared):.3f}"
+
+
+def _told(chance: float) -> float:
+    """To three decimals, and never more than it is: what is missed by little is not told as reached."""
+    return math.floor(round(chance * 1000.0, DECIMALS)) / 1000.0
 
 
 def goal_of_lane(lane: Lane, risk: float) -> Goal:

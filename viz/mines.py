@@ -1,5 +1,5 @@
-"""How many mines may be left, over time: the mean and the 90 % interval, how many are found, and which share of all is;
-and with which chance none is left."""
+"""How many mines may be left, over time: the mean and the 90 % interval, and how many are found; with which chance a
+mine has been found, and none is left."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SERIES = {
     paths.MINES_LEFT: ("may be left", palette.WORST_RISK, 2.0),
     paths.MINES_LEFT_LOW: ("at least, with 95 %", palette.WORST_RISK, 0.75),
     paths.MINES_LEFT_HIGH: ("at most, with 95 %", palette.WORST_RISK, 0.75),
-    paths.CLEARANCE_SHARE: ("expected share of all mines that is found", palette.COVERED, 2.0),
+    paths.CLEARANCE_SHARE: ("chance that a mine has been found", palette.COVERED, 2.0),
     paths.NONE_LEFT: ("chance that none is left", palette.WORST_RISK, 2.0),
 }
 

@@ -17,6 +17,7 @@ from secondlook.errors import UserError
 from secondlook.recorded import RecordedMission, load_run
 
 FARTHEST_M = 1e7  # a quarter of the way round the earth
+LEAST_M2 = 0.01
 WHOLE = 0.999
 """Share of a place from which on nothing is said of the rest: the straight ends of a lane reach over an edge askew."""
 
@@ -33,11 +34,13 @@ def mines(
     ] = None,
 ) -> None:
     """Tell how many mines may be left in a mission's area at its end, or in what of it lies in a polygon or a lane, the
-    clearance (which share of all mines there is expected to have been found), and the risk of a ship that passes
+    clearance (with which chance a mine that lies there has been found), and the risk of a ship that passes
     there."""
     name, place = _place(lane, width, polygon)
     with reading("mines", 1.0) as on_read:
         mission = load_run(run, on_read)
+        if place is not None and mission.area.intersection(place).area < LEAST_M2:
+            raise UserError(f"--{name}: nothing of the area lies there; must be a {name} of which {LEAST_M2:g} m² does")
         left = mission.mines_left(place)
     if left is None:
         raise UserError(f"{run}: nothing of the area was seen, so nothing can be said; must be a run with a look")

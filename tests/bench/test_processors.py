@@ -38,7 +38,7 @@ def test_one_that_differs_is_told_and_fails(monkeypatch: Patch, capsys: Output) 
 def test_all_alike_is_well(monkeypatch: Patch, capsys: Output) -> None:
     told_by(monkeypatch)
     assert processors.main([]) == 0
-    assert capsys.readouterr().out.endswith(f"0 of {len(processors.BUNDLED) + 4} missions differ\n")
+    assert capsys.readouterr().out.endswith(f"0 of {len(processors.BUNDLED) + len(processors.ODD)} missions differ\n")
 
 
 def test_where_nothing_can_be_told_it_does_not_pass(monkeypatch: Patch, capsys: Output) -> None:
@@ -54,14 +54,24 @@ def test_a_mission_flown_with_less_has_its_digest() -> None:
     assert with_all == with_less != processors.digest(brief, 4, "")
 
 
-def test_the_c_library_does_with_less_as_well() -> None:
-    """It works last bits out otherwise then, as it would on another processor."""
-    command = [sys.executable, "-c", "import math; print(*[math.sin(number / 7) for number in range(7000)])"]
-    plain = os.environ | {"GLIBC_TUNABLES": processors.PLAIN_LIBRARY}
+ROOTS = "numpy.sqrt(numpy.arange(number)) @ numpy.sqrt(numpy.arange(number))[::-1].copy()"
+
+
+@pytest.mark.parametrize("worked_out", ["math.sin(number / 7)", ROOTS])
+def test_the_c_library_and_linear_algebra_do_with_less_as_well(worked_out: str) -> None:
+    """They work last bits out otherwise then, as they would on another processor."""
+    command = [sys.executable, "-c", f"import math, numpy; print(*[float({worked_out}) for number in range(7000)])"]
     one, other = (
         [float(value) for value in subprocess.run(command, env=env, capture_output=True, check=True).stdout.split()]
-        for env in (os.environ, plain)
+        for env in (os.environ, os.environ | processors.PLAIN)
     )
     if platform.libc_ver()[0] == "glibc" and "X86_V3" in processors.NOT_EVERYWHERE:
         assert one != other
-    assert one == pytest.approx(other, rel=1e-12)
+    assert one == pytest.approx(other, rel=1e-9)
+
+
+def test_a_scenario_that_is_not_bundled_is_refused(capsys: Output) -> None:
+    with pytest.raises(SystemExit) as refused:
+        processors.main(["--scenarios", "clear,nosuch"])
+    assert refused.value.code == 2
+    assert "'nosuch' is not bundled; must be some of: armada, " in capsys.readouterr().err

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from planner.clearance import PRIOR_MINES, MinesLeft, mines_left
+from planner.clearance import PRIOR_MINES, Detected, MinesLeft, mines_left
 from planner.goal import Goal, Lane, goal_of_lane
 from planner.region import Region
 from planner.types import GridSpec, SweepFrame
@@ -16,7 +19,9 @@ GRID = GridSpec(SweepFrame(0.0, 0.0, 0.0), 5.0, columns=21, rows=20)  # columns 
 
 
 def left_of(risk: float, found: int) -> MinesLeft:
-    told = mines_left(np.full(ALL.shape, risk), ALL, ALL, 25.0, np.ones(found), 0.0)
+    told = mines_left(
+        np.full(ALL.shape, risk), ALL, ALL, 25.0, Detected(np.ones(found), np.ones(found, dtype=np.bool_)), 0.0
+    )
     assert told is not None
     return told
 
@@ -31,7 +36,10 @@ def test_of_100_that_are_found_25_may_be_left_for_a_clearance_of_80_percent() ->
     assert not Goal(0.8, float(true.cdf(25)) + 0.001).is_reached(left)
     # With 90 % no more than so many are left, so that of all so many are found.
     assert left.clearance_with(0.9) == pytest.approx(100.0 / (100.0 + true.ppf(0.9)))
-    assert goal.words_now(left) == f"the chance is {true.cdf(25):.3f}, and with 0.9 the clearance is 0.806"
+    assert (
+        goal.words_now(left)
+        == f"the chance is {math.floor(true.cdf(25) * 1000) / 1000}, and with 0.9 the clearance is 0.806"
+    )
     assert goal.words == "a clearance of 0.8 with a chance of 0.9"
 
 
@@ -42,13 +50,20 @@ def test_the_last_bits_of_a_chance_decide_nothing(last_bits: float) -> None:
     assert not Goal(1.0, 0.900001).is_reached(left)
 
 
+def test_what_is_missed_by_little_is_not_told_as_reached() -> None:
+    left = MinesLeft(0.1, 0, 1, 0.8996, 0.99, np.array([0.8996, 1.0]), np.ones(10))
+    assert Goal(1.0, 0.9).words_now(left) == "the chance is 0.899"
+    assert goal_of_lane(Lane(((0.0, 0.0), (10.0, 0.0)), 5.0), 0.1).words_now(left) == "the risk is 0.101"
+    assert Goal(1.0, 0.9).words_now(replace(left, reached=np.array([0.9 - 1e-13, 1.0]))) == "the chance is 0.900"
+
+
 def test_none_is_left_with_the_chance_of_0() -> None:
     left = left_of(0.001, 10)
     goal = Goal(1.0, 0.95)
     assert goal.chance_now(left) == pytest.approx(0.999**10.5)
     assert goal.is_reached(left)
     assert not Goal(1.0, 0.99).is_reached(left)
-    assert goal.words_now(left) == "the chance is 0.990"
+    assert goal.words_now(left) == "the chance is 0.989"  # 0.98955
 
 
 def test_where_nothing_was_found_and_much_was_seen_a_clearance_is_that_none_is_left() -> None:
@@ -75,7 +90,7 @@ def test_a_lane_has_so_much_of_each_cell_as_lies_within_half_its_width() -> None
     assert goal.is_reached(left)
     assert not goal_of_lane(lane, 0.005).is_reached(left)
     assert goal.words == "a risk of at most 0.05 that a mine is left in the lane"
-    assert goal.words_now(left) == "the risk is 0.010"
+    assert goal.words_now(left) == "the risk is 0.011"  # 0.01045
 
 
 def test_what_a_lane_goes_round_is_not_in_it() -> None:

@@ -70,4 +70,14 @@ def test_of_a_mission_without_a_look_nothing_is_said(called: Call, tmp_path: Pat
 def test_points_may_be_written_in_several_ways(called: Call, brief_run: Path, points: str) -> None:
     told = called("mines", str(brief_run), "--lane", points, "--width", "20")
     assert told.code == 2
-    assert told.err == "within: nothing of the area lies there; must be a polygon in the mission frame\n"
+    assert told.err == "--lane: nothing of the area lies there; must be a lane of which 0.01 m² does\n"
+
+
+def test_what_lies_elsewhere_or_is_next_to_nothing_is_refused(called: Call, brief_run: Path) -> None:
+    for corners in ("-90,-90 -80,-90 -80,-80", "50,50 50.001,50 50,50.001"):
+        told = called("mines", str(brief_run), "--polygon", corners)
+        assert told.code == 2
+        assert told.err == "--polygon: nothing of the area lies there; must be a polygon of which 0.01 m² does\n"
+    assert called("mines", str(brief_run), "--lane", "50,20 50,80", "--width", "1e-9").code == 2
+    told = called("mines", str(brief_run), "--lane", "50,20 50,80", "--width", "0.001")
+    assert told.out.startswith("in the lane about 0.00 mines are left, 0 to 0 with 90 %; ")

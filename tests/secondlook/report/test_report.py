@@ -87,7 +87,7 @@ def test_what_it_says_is_what_the_summary_says(page: Page, mission: RecordedMiss
     assert f"{summary['truth']['predicted_missed_share']:.0%}".replace("%", " % were to be expected") in page.told
     assert f"In truth {summary['truth']['left']} are left: missed, or not on the list of mines." in page.told
     mines = summary["mines"]
-    assert f"is expected to have been found, is {mines['clearance']:.0%}".replace("%", " %.") in page.told
+    assert f"the chance that a mine has been found, is {mines['clearance']:.0%}".replace("%", " %.") in page.told
     assert f"{mines['left']:.0f} may be left: {mines['left_low']} to {mines['left_high']} with 90 %" in page.told
     assert f"none with {mines['none_left']:.1%}".replace("%", " %") in page.told
     assert f"a chance of {LISTED_FROM:g} or more to be one" in page.told
