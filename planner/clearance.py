@@ -37,6 +37,7 @@ NODES = np.linspace(-6.0, 6.0, 31)
 """Of a standard normal distribution, near enough to each other that sums over them are integrals."""
 SHARES = np.exp(-(NODES**2) / 2.0) / np.exp(-(NODES**2) / 2.0).sum()
 MOST_SCATTER = 1.0
+"""That of tracks of which all but one saw next to nothing."""
 MOST_MINES = 100_000
 """So many and more are told as one number."""
 LOW, HIGH = 0.05, 0.95
@@ -221,7 +222,7 @@ def scatter_of(curves: Sequence[DetectionCurve]) -> float:
     seen = seen[seen > 0.0]
     if len(seen) < 2:
         return UNKNOWN_SCATTER
-    return float(seen.std(ddof=1) / seen.mean() / math.sqrt(len(seen)))
+    return min(MOST_SCATTER, float(seen.std(ddof=1) / seen.mean() / math.sqrt(len(seen))))
 
 
 def _negative_binomial(shape: float, mean: float) -> FloatArray:

@@ -16,6 +16,7 @@ from told_tile import whole_map
 
 from planner.clearance import (
     CAUTIOUS_MINES,
+    MOST_SCATTER,
     PRIOR_MINES,
     UNKNOWN_SCATTER,
     Detected,
@@ -100,7 +101,7 @@ def test_with_scatter_it_is_an_integral_over_how_much_was_seen(found: int, scatt
     told = left_of(np.where(west, 0.6, 0.2), found, scatter, place=west)
     mean, clearance, numbers = 0.0, 0.0, np.arange(6000)
     reached = np.zeros(numbers.size)
-    normal = np.linspace(-7.0, 7.0, 701)
+    normal = np.linspace(-7.0, 7.0, 141)
     weights = np.exp(-(normal**2) / 2)
     for node, share in zip(normal, weights / weights.sum(), strict=True):
         exponent = math.exp(scatter * node - scatter**2 / 2)
@@ -494,3 +495,10 @@ def test_tracks_that_saw_alike_tell_surely_and_such_that_differ_do_not() -> None
     # A track that has seen nothing tells nothing.
     assert scatter_of([curve(0.4), curve(0.0), curve(0.6)]) == scatter_of([curve(0.4), curve(0.6)])
     assert scatter_of([curve(0.5)]) == scatter_of([]) == scatter_of([curve(0.0)] * 2) == UNKNOWN_SCATTER == 0.3
+
+
+@given(st.lists(st.floats(1e-16, 1.0, exclude_max=True), min_size=1, max_size=6))
+def test_no_tracks_scatter_more_than_one_may_ask_for(peaks: list[float]) -> None:
+    scatter = scatter_of([curve(peak) for peak in peaks])
+    assert 0.0 <= scatter <= MOST_SCATTER
+    assert left_of(0.5, 3, scatter).mean > 0.0
