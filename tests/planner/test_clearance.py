@@ -346,6 +346,13 @@ def test_that_it_is_not_sure_what_is_a_mine_makes_the_interval_wider(
     assert 0.89 < ((told.low <= left) & (left <= told.high)).mean() < 0.94
 
 
+def test_of_a_place_wholly_seen_what_is_not_listed_there_is_left() -> None:
+    told = mines_left(np.where(ALL, 0.0, 0.5), ALL, ALL, CELL_M2, surely(5, [0.3, 0.2]), 0.0)
+    assert told is not None
+    assert told.reached == pytest.approx([0.7 * 0.8, 1.0 - 0.3 * 0.2, 1.0])
+    assert [told.mean, told.low, told.high] == pytest.approx([0.5, 0, 2])  # at most one with 94 %
+
+
 def test_clearance_is_of_the_search_and_not_of_what_it_happened_to_find() -> None:
     one = np.zeros(ALL.shape, dtype=np.bool_)
     one[0, 0] = True
@@ -418,6 +425,23 @@ def test_what_lies_beyond_the_area_does_not_count_but_for_what_may_lie_in_it() -
     assert without is not None
     assert [told.found, without.found] == pytest.approx([9.0, 8.0])  # that at 37 m may lie at 22 m
     assert told.mean == pytest.approx(without.mean * 9.5 / 8.5)
+
+
+@pytest.mark.parametrize(
+    ("x_m", "y_m", "cell"), [(0.0, -3.0, (0, 0)), (0.0, 43.0, (7, 0)), (-6.0, 1.0, (0, 0)), (49.0, 1.0, (0, 9))]
+)
+def test_what_lies_beside_the_grid_counts_in_the_nearest_cell(x_m: float, y_m: float, cell: tuple[int, int]) -> None:
+    fleet = FleetMap(GridSpec(SweepFrame(0.0, 0.0, 0.0), 5.0, columns=10, rows=8))
+    levels = to_levels(np.full(ALL.shape, 0.7))
+    fleet.join("one", 0, whole_map(levels, levels))
+    objects = ObjectsOnMap(fleet)
+    objects.hear(Sighting("one", x_m, y_m, 0.0, 1.0))
+    place = np.zeros(ALL.shape)
+    place[cell] = 0.5
+    there, elsewhere = (mines_left_by(objects, ALL, 0.0, one) for one in (place, np.where(place > 0.0, 0.0, 1.0)))
+    assert there is not None
+    assert elsewhere is not None
+    assert [there.found, elsewhere.found] == pytest.approx([0.5 * objects.mines, 0.0])
 
 
 @pytest.mark.parametrize("scatter", [-0.1, 1.1, math.nan])
