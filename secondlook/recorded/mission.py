@@ -250,18 +250,20 @@ class Mission(ABC):
     @cached_property
     def objects(self) -> list[ObjectRecord]:
         """What lies on the seabed by all contacts together, those first that are mines most likely."""
-        metrics = Metrics()
-        for one in self.received(RunInfo, CoverageTile, Contact):
-            metrics.hear(one)
-        return objects(*metrics.mine_chances())
+        return objects(*self._list_of_mines.mine_chances())
 
     @cached_property
     def targets(self) -> list[TargetRecord]:
         """The targets, and which of them were detected and listed; none where the truth is not known."""
+        return targets(self.said(TruthTargets), self.said(TruthLook), self._list_of_mines.targets_found())
+
+    @cached_property
+    def _list_of_mines(self) -> Metrics:
+        """What of the messages tells of it, and of whether it is right."""
         metrics = Metrics()
         for one in self.received(RunInfo, CoverageTile, Contact, TruthTargets, TruthLook):
             metrics.hear(one)
-        return targets(self.said(TruthTargets), self.said(TruthLook), metrics.targets_found())
+        return metrics
 
 
 class RecordedMission(Mission):
