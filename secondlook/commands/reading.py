@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from secondlook.progress import no_remark, shown_progress
 from secondlook.recorded.mission import OnRead
 
-GEOJSON, REPORT, PICTURE = 0.8, 2.3, 0.9
+GEOJSON, REPORT, PICTURE = 1.25, 2.0, 0.9
 """How often each of them reads the messages of a mission, about, a message's length counted."""
 
 

@@ -42,7 +42,7 @@ from planner.risk import RiskStatistics, risk_statistics
 from planner.types import BoolArray, DetectionCurve, FloatArray, GridSpec, Point
 from secondlook.recorded.closest_approach import ClosestApproaches
 from secondlook.recorded.kept_out import Entries
-from secondlook.recorded.listed import matched
+from secondlook.recorded.listed_targets import matched
 from secondlook.recorded.vehicles import Ending
 from secondlook.recorded.whereabouts import Place, Whereabouts
 
@@ -209,20 +209,27 @@ class Metrics:
     def targets_met(self) -> tuple[FloatArray, BoolArray]:
         """Of each target the fleet's residual risk where it lies, and whether nobody has detected it; both of shape
         (targets,)."""
-        if self.map is None or self.targets is None:
+        if self.map is None:
             return np.zeros(0), np.zeros(0, dtype=np.bool_)
-        missed = ~np.isin(np.arange(len(self.targets.targets)), sorted(self.detected))
-        return self.map.risk[self._target_cells(self.map.grid)], missed
+        return self.map.risk[self._target_cells(self.map.grid)], ~self._detected()
+
+    def _detected(self) -> BoolArray:
+        """Whether somebody has detected each target; shape (targets,)."""
+        return np.isin(np.arange(len(self._targets_m())), sorted(self.detected))
+
+    def _targets_m(self) -> FloatArray:
+        """East and north of each target, mission frame; shape (targets, 2). None before a run is announced."""
+        told = () if self.map is None or self.targets is None else self.targets.targets
+        return np.array([(one.x_m, one.y_m) for one in told], dtype=np.float64).reshape(-1, 2)
 
     def truly_found(self, within: BaseGeometry | None = None) -> float | None:
         """The share of the targets that are found, see `targets_found`, of all or of those that lie in a geometry
         (mission frame) or on its border, 1 where none does; None in a world without targets."""
         found = self.targets_found()
-        if self.targets is None or not found.size:
+        if not found.size:
             return None
         if within is not None:
-            x_m, y_m = np.array([(one.x_m, one.y_m) for one in self.targets.targets]).T
-            found = found[shapely.intersects_xy(within, x_m, y_m)]
+            found = found[shapely.intersects_xy(within, self._targets_m())]
         return float(found.mean()) if found.size else 1.0
 
     def targets_found(self) -> BoolArray:
@@ -232,18 +239,13 @@ class Metrics:
     def _listed_and_found(self) -> tuple[BoolArray, BoolArray]:
         """Which objects on the list of mines are targets, and which targets are found, see `matched`."""
         seen, chances = self.mine_chances()
-        listed, (_, missed) = are_listed(chances), self.targets_met()
-        told = () if self.targets is None or not missed.size else self.targets.targets
-        targets_m = np.array([(one.x_m, one.y_m) for one in told], dtype=np.float64).reshape(-1, 2)
+        listed = are_listed(chances)
         listed_m = np.stack([seen.x_m, seen.y_m], axis=1)[listed]
-        return matched(listed_m, seen.gate_m[listed], targets_m, ~missed)
+        return matched(listed_m, seen.gate_m[listed], self._targets_m(), self._detected())
 
     def _target_cells(self, grid: GridSpec) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """The row and column of each target's cell."""
-        assert self.targets is not None
-        x_m = np.array([target.x_m for target in self.targets.targets])
-        y_m = np.array([target.y_m for target in self.targets.targets])
-        rows, columns = grid.cells_of(x_m, y_m)
+        rows, columns = grid.cells_of(*self._targets_m().T)
         return np.clip(rows, 0, grid.rows - 1), np.clip(columns, 0, grid.columns - 1)
 
     def mines_left(self, place: FloatArray | None = None, prior_mines: float = PRIOR_MINES) -> MinesLeft | None:

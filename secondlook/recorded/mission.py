@@ -250,20 +250,12 @@ class Mission(ABC):
     @cached_property
     def objects(self) -> list[ObjectRecord]:
         """What lies on the seabed by all contacts together, those first that are mines most likely."""
-        return objects(*self._list_of_mines.mine_chances())
+        return objects(*self._figures.mine_chances())
 
     @cached_property
     def targets(self) -> list[TargetRecord]:
         """The targets, and which of them were detected and listed; none where the truth is not known."""
-        return targets(self.said(TruthTargets), self.said(TruthLook), self._list_of_mines.targets_found())
-
-    @cached_property
-    def _list_of_mines(self) -> Metrics:
-        """What of the messages tells of it, and of whether it is right."""
-        metrics = Metrics()
-        for one in self.received(RunInfo, CoverageTile, Contact, TruthTargets, TruthLook):
-            metrics.hear(one)
-        return metrics
+        return targets(self.said(TruthTargets), self.said(TruthLook), self._figures.targets_found())
 
 
 class RecordedMission(Mission):

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from secondlook.recorded.listed import matched
+from secondlook.recorded.listed_targets import matched
 
 ALONG = [(0.0, 0.0), (10.0, 0.0), (20.0, 0.0)]
 ALL = [True, True, True]
