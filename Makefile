@@ -45,7 +45,7 @@ docs: .venv/.test-ready
 	@$(BIN)/python -m docs.pages
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --clean
 
-# The tables of the docs that missions are flown for, all of them anew: some three hours on two cores.
+# The tables of the docs that missions are flown for, all of them anew: some five hours on two cores.
 docs-figures: .venv/.test-ready
 	@$(BIN)/python -m bench.figures --fly all
 

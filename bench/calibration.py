@@ -3,8 +3,9 @@
 `secondlook sweep SCENARIO --seeds 1..100 --vary targets.correlation=0,1 --vary mission.rho=0,1 --out DIR` flies them;
 `python -m bench.calibration DIR ...` prints a line for each combination of what was varied: how many missions, how many
 mines were left on average and how many were told, the share of missions whose 90 % interval holds the truth, with the
-95 % interval of that share, and how many have more left than that interval, and fewer. Of missions that were flown for
-a goal a second table tells how many have reached it, and in how many of these it is so in truth.
+95 % interval of that share, and how many have more left than that interval, and fewer; beside them the share that the
+dumbest reckoning holds, for comparison (`plain_interval`). Of missions that were flown for a goal a second table tells
+how many have reached it, and in how many of these it is so in truth.
 
 `python -m bench.calibration --diagram FILE.png --missions 60 SCENARIO [KEY=VALUE ...]` asks the same of places: it
 flies the scenario with 1000 targets and the seeds from 1 on, tells which share was missed and which was predicted, and
@@ -22,13 +23,15 @@ from operator import itemgetter
 from pathlib import Path
 from statistics import fmean
 
+from scipy.stats import nbinom
+
 import secondlook
 from bench import predicted_risk
 from bench.rows import MISSION, Column, Row, by, head, line, mean_table
 from secondlook.errors import UserError
 from secondlook.scenario import load_scenario
 
-HEADS = ("missions", "left", "told", "within 90 %", "95 % of that", "more left", "fewer")
+HEADS = ("missions", "left", "told", "within 90 %", "95 % of that", "more left", "fewer", "plainly")
 MANY = 1000
 """Missions, from which on shares are told to a tenth of a per cent."""
 GOAL_HEADS = ("missions", "reached it", "after, s", "true", "95 % of that")
@@ -38,7 +41,10 @@ CONTACT_COLUMNS = (
     Column("of these listed", itemgetter("truth.listed_share"), 2),
     Column("listed falsely, a km²", itemgetter("truth.false_listed_per_km2"), 2),
 )
-LEFT_FIGURES = (*MISSION, "truth.targets", "truth.left", "mines.left", "mines.left_low", "mines.left_high")
+LEFT_FIGURES = (
+    *(*MISSION, "truth.targets", "truth.left"),
+    *("mines.found", "mines.left", "mines.left_low", "mines.left_high"),
+)
 GOAL_FIGURES = (*MISSION, "time.mission_s", "goal.reached", "goal.true")
 CONTACT_FIGURES = (*MISSION, "truth.missed_share", "truth.listed_share", "truth.false_listed_per_km2")
 """What the tables are made of."""
@@ -51,16 +57,27 @@ def share_interval(held: int, of: int) -> tuple[float, float]:
     return (middle - spread) / (1 + z * z / of), (middle + spread) / (1 + z * z / of)
 
 
+def plain_interval(found: float, risk: float) -> tuple[float, float]:
+    """The 90 % interval of the mines left by the dumbest reckoning that may do as well: of as many as lie there each is
+    missed with the mean residual risk, less than 1, and as many as were `found` were not. So risk / (1 - risk) for each
+    one found, by a negative binomial distribution with Jeffreys' half a mine more, as if P(y), the objects and where
+    they lie were known for certain.
+    """
+    low, high = nbinom.ppf((0.05, 0.95), found + 0.5, 1 - risk)
+    return float(low), float(high)
+
+
 @dataclass(frozen=True)
 class Held:
     """Of some missions how many mines were `left` and how many were `told`, on average, and in how many missions `more`
-    were left than the 90 % interval holds, and `fewer`."""
+    were left than the 90 % interval holds, and `fewer`; in how many the one `plainly` reckoned holds them."""
 
     missions: int
     left: float
     told: float
     more: int
     fewer: int
+    plainly: int
 
     @classmethod
     def of(cls, missions: Sequence[Row]) -> Held:
@@ -68,7 +85,8 @@ class Held:
         more = sum(row["truth.left"] > row["mines.left_high"] for row in missions)
         fewer = sum(row["truth.left"] < row["mines.left_low"] for row in missions)
         left, told = (fmean(row[name] for row in missions) for name in ("truth.left", "mines.left"))
-        return cls(len(missions), left, told, more, fewer)
+        plain = [(row["truth.left"], *plain_interval(row["mines.found"], row["risk.mean"])) for row in missions]
+        return cls(len(missions), left, told, more, fewer, sum(low <= left <= high for left, low, high in plain))
 
     def figures(self) -> list[str]:
         """Under HEADS."""
@@ -76,7 +94,8 @@ class Held:
         held = self.missions - self.more - self.fewer
         low, high = share_interval(held, self.missions)
         shares = f"{held / self.missions:.{digits}%}", f"{low:.{digits}%} to {high:.{digits}%}"
-        return [str(self.missions), f"{self.left:.1f}", f"{self.told:.1f}", *shares, str(self.more), str(self.fewer)]
+        beyond = str(self.more), str(self.fewer), f"{self.plainly / self.missions:.{digits}%}"
+        return [str(self.missions), f"{self.left:.1f}", f"{self.told:.1f}", *shares, *beyond]
 
 
 def table(rows: Iterable[Row], varied: Sequence[str]) -> list[str]:

@@ -43,9 +43,10 @@ FEW_MISSIONS = 60
 
 SMALL = "area.polygon_m=[[0, 0], [404, 0], [404, 133], [0, 133]]"
 MANY_TIMES: tuple[tuple[Case, int], ...] = (
-    (("tellaro", (SMALL,)), 3_800),
-    (("tellaro", (SMALL, "targets.correlation=1", "mission.rho=1")), 500),
-    (("tellaro", (SMALL, "seabed={kind: patchy}")), 500),
+    (("tellaro", (SMALL,)), 10_000),
+    (("tellaro", (SMALL, "targets.correlation=1", "mission.rho=1")), 1_000),
+    (("tellaro", (SMALL, "seabed={kind: patchy}")), 1_000),
+    (("tellaro", (SMALL, *(f"vehicles.{one}.sensor.noise_track=0.5" for one in BOTH))), 1_000),
 )
 """What is flown so often that one may tell 90 % from 88 and 92."""
 

@@ -5,7 +5,7 @@ python -m bench.figures [--fly NAME ...]
 
 Without a name it writes each table anew into its page, from what is kept in docs/figures/: behind the line
 `<!-- figures: NAME -->`. With `--fly` it flies the missions of these tables before that, or of `all`, and keeps what
-they left; that is some three hours for all. Broken off, the same command goes on with the sweeps in `runs/figures/`;
+they left; that is some five hours for all. Broken off, the same command goes on with the sweeps in `runs/figures/`;
 these refuse to with other code, and are to be removed then. A test holds the pages to what is kept, and flies one
 mission of each table again: where that leaves something else, the table is stale.
 """

@@ -8,26 +8,35 @@ from typing import Any
 
 import pytest
 
-from bench.calibration import Held, contact_table, goal_table, main, share_interval, table
+from bench.calibration import Held, contact_table, goal_table, main, plain_interval, share_interval, table
 
 
 def row(left: int, low: int, high: int, **varied: Any) -> dict[str, Any]:
     truth = {"truth.targets": 200, "truth.left": left}
-    return {"failure": None, **truth, "mines.left": 60.0, "mines.left_low": low, "mines.left_high": high, **varied}
+    told = {"risk.mean": 0.5, "mines.found": 60.0, "mines.left": 60.0, "mines.left_low": low, "mines.left_high": high}
+    return {"failure": None, **truth, **told, **varied}
 
 
 def test_a_line_for_each_combination_tells_how_often_the_interval_holds() -> None:
     rows = [row(60, 50, 70, rho=0.0), row(70, 50, 70, rho=0.0), row(71, 50, 70, rho=0.0), row(49, 50, 70, rho=0.0)]
     rows += [row(99, 50, 70, rho=1.0), {**row(1, 0, 9, rho=1.0), "failure": "node died"}]
     head, _, right, wrong = table(rows, ["rho"])
-    assert head.startswith("| `rho` | missions | left | told | within 90 % |")
-    assert right == "| `0.0` | 4 | 62.5 | 60.0 | 50% | 15% to 85% | 1 | 1 |"
-    assert wrong == "| `1.0` | 1 | 99.0 | 60.0 | 0% | 0% to 79% | 1 | 0 |"
+    assert head == "| `rho` | missions | left | told | within 90 % | 95 % of that | more left | fewer | plainly |"
+    assert right == "| `0.0` | 4 | 62.5 | 60.0 | 50% | 15% to 85% | 1 | 1 | 100% |"
+    assert wrong == "| `1.0` | 1 | 99.0 | 60.0 | 0% | 0% to 79% | 1 | 0 | 0% |"
 
 
 def test_of_many_missions_the_share_is_told_to_a_tenth_of_a_per_cent() -> None:
     held = Held.of([row(60, 50, 70)] * 897 + [row(71, 50, 70)] * 60 + [row(49, 50, 70)] * 43)
-    assert held.figures() == ["1000", "60.2", "60.0", "89.7%", "87.7% to 91.4%", "60", "43"]
+    assert held.figures() == ["1000", "60.2", "60.0", "89.7%", "87.7% to 91.4%", "60", "43", "100.0%"]
+
+
+def test_the_plain_interval_is_that_of_those_missed_for_each_one_found() -> None:
+    # Of a third that is missed half a one for each one found, with a variance of a half over two thirds of them.
+    low, high = plain_interval(10_000, 1 / 3)
+    assert (low + high) / 2 == pytest.approx(5_000, abs=2)
+    assert high - low == pytest.approx(2 * 1.645 * (10_000 * 0.5 / (2 / 3)) ** 0.5, rel=0.01)
+    assert plain_interval(3, 0.0) == (0, 0)
 
 
 def test_missions_without_targets_or_without_a_look_tell_nothing() -> None:

@@ -100,6 +100,19 @@ def test_what_a_page_says_beside_the_table_of_contacts_is_what_is_kept() -> None
         assert words.format(math.ceil(max(high - low for low, high in ends) / 2 * at) / at) in page
 
 
+def test_intervals_hold_what_pages_say_that_they_do() -> None:
+    held = [row["held"] for row in kept("intervals")["rows"]]
+    ours = [1 - (one["more"] + one["fewer"]) / one["missions"] for one in held]
+    plain = [one["plainly"] / one["missions"] for one in held]
+    assert all(abs(share - 0.9) <= 0.02 for share in (*ours[:2], *plain[:3]))
+    many = f"it holds {100 * plain[0]:.1f} % of 10,000 missions and ours {100 * ours[0]:.1f} %"
+    told_wrong = f"the plain one holds {100 * plain[3]:.0f} % and ours {100 * ours[3]:.0f} %"
+    small = f"{100 * ours[2]:.0f} % are held for 90, where the plain one holds {100 * plain[2]:.0f}."
+    decision = words_of("docs/decisions/0041-not-knowing-p-of-y-widens-the-interval.md")
+    assert [words for words in (many, told_wrong, small) if words not in decision] == []
+    assert f"Of 10,000 missions {100 * ours[0]:.1f} % have" in words_of("CHANGELOG.md")
+
+
 def test_what_a_mission_is_shown_to_say_of_the_mines_left_is_what_it_says(tmp_path: Path) -> None:
     summary = Fleet("tellaro", folder=tmp_path, record=False).run().summary
     page = (ROOT / "docs/clearance.md").read_text()
