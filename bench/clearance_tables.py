@@ -53,12 +53,12 @@ MANY_TIMES: tuple[tuple[Case, int], ...] = (
 LONGER = "mission.deadline_factor={}"
 NONE_LEFT = "mission.goal={{kind: none_left, chance: {}}}"
 GOALS: tuple[tuple[Case, int], ...] = (
-    (("tellaro", ("mission.goal={kind: cleared, clearance: 0.6}",)), 30),
-    (("patchy", (LONGER.format(2), "mission.goal={kind: cleared, clearance: 0.6}")), 30),
-    (("two-helpers", (LONGER.format(2), "mission.goal={kind: cleared, clearance: 0.9}")), 30),
-    (("two-helpers", (LONGER.format(4), "mission.goal={kind: cleared, clearance: 0.96}")), 30),
-    (("two-helpers", (LONGER.format(4), "targets.count=10", NONE_LEFT.format(0.8))), 30),
-    (("two-helpers", (LONGER.format(6), "targets.count=10", "coordinator.worth_risk=0.01", NONE_LEFT.format(0.9))), 30),
+    (("tellaro", ("mission.goal={kind: cleared, clearance: 0.6}",)), 60),
+    (("patchy", (LONGER.format(2), "mission.goal={kind: cleared, clearance: 0.6}")), 60),
+    (("two-helpers", (LONGER.format(2), "mission.goal={kind: cleared, clearance: 0.9}")), 60),
+    (("two-helpers", (LONGER.format(4), "mission.goal={kind: cleared, clearance: 0.96}")), 60),
+    (("two-helpers", (LONGER.format(4), "targets.count=10", NONE_LEFT.format(0.8))), 60),
+    (("two-helpers", (LONGER.format(6), "targets.count=10", "coordinator.worth_risk=0.01", NONE_LEFT.format(0.9))), 60),
     (
         (
             "two-helpers",
@@ -67,7 +67,7 @@ GOALS: tuple[tuple[Case, int], ...] = (
                 "mission.goal={kind: lane, lane_m: [[600, 20], [600, 380]], width_m: 30, risk: 0.1}",
             ),
         ),
-        100,
+        300,
     ),
 )
 """What missions are flown for, and what they need to reach it; how many are."""

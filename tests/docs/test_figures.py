@@ -113,6 +113,15 @@ def test_intervals_hold_what_pages_say_that_they_do() -> None:
     assert f"Of 10,000 missions {100 * ours[0]:.1f} % have" in words_of("CHANGELOG.md")
 
 
+def test_goals_are_as_often_true_as_a_page_says_beside_their_table() -> None:
+    reached = [row for row in kept("goals")["rows"] if row["goal.reached"]]
+    asked = [row["goal.true"] for row in reached if not any("chance: 0.8" in one for one in row["overrides"])]
+    lanes = [row["goal.true"] for row in reached if any("kind: lane" in one for one in row["overrides"])]
+    told = f"Of the {len(asked)} missions that told 90 %, {100 * fmean(asked):.1f} % were right"
+    assert f"{told}, of those with a lane {100 * fmean(lanes):.1f} %." in words_of("docs/clearance.md")
+    assert fmean(asked) >= 0.9
+
+
 def test_what_a_mission_is_shown_to_say_of_the_mines_left_is_what_it_says(tmp_path: Path) -> None:
     summary = Fleet("tellaro", folder=tmp_path, record=False).run().summary
     page = (ROOT / "docs/clearance.md").read_text()
