@@ -4,7 +4,7 @@
 `python -m bench.calibration DIR ...` prints a line for each combination of what was varied: how many missions, how many
 mines were left on average and how many were told, the share of missions whose 90 % interval holds the truth, with the
 95 % interval of that share, and how many have more left than that interval, and fewer; beside them the share that the
-dumbest reckoning holds, for comparison (`plain_interval`). Of missions that were flown for a goal a second table tells
+dumbest reckoning holds, for comparison (`plain_intervals`). Of missions that were flown for a goal a second table tells
 how many have reached it, and in how many of these it is so in truth.
 
 `python -m bench.calibration --diagram FILE.png --missions 60 SCENARIO [KEY=VALUE ...]` asks the same of places: it
@@ -23,11 +23,12 @@ from operator import itemgetter
 from pathlib import Path
 from statistics import fmean
 
-from scipy.stats import nbinom
+import numpy as np
 
 import secondlook
 from bench import predicted_risk
 from bench.rows import MISSION, Column, Row, by, head, line, mean_table
+from planner.types import FloatArray
 from secondlook.errors import UserError
 from secondlook.scenario import load_scenario
 
@@ -57,14 +58,16 @@ def share_interval(held: int, of: int) -> tuple[float, float]:
     return (middle - spread) / (1 + z * z / of), (middle + spread) / (1 + z * z / of)
 
 
-def plain_interval(found: float, risk: float) -> tuple[float, float]:
-    """The 90 % interval of the mines left by the dumbest reckoning that may do as well: of as many as lie there each is
-    missed with the mean residual risk, less than 1, and as many as were `found` were not. So risk / (1 - risk) for each
-    one found, by a negative binomial distribution with Jeffreys' half a mine more, as if P(y), the objects and where
-    they lie were known for certain.
+def plain_intervals(found: FloatArray, risk: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """From how many to how many mines are left with 90 %, for each of some missions, by the dumbest reckoning that may
+    do as well: of as many as lie there each is missed with the mean residual `risk`, less than 1, and as many as were
+    `found` were not. So risk / (1 - risk) for each one found, by a negative binomial distribution with Jeffreys' half a
+    mine more, as if P(y), the objects and where they lie were known for certain.
     """
-    low, high = nbinom.ppf((0.05, 0.95), found + 0.5, 1 - risk)
-    return float(low), float(high)
+    from scipy.stats import nbinom  # noqa: PLC0415 - it takes half a second to import
+
+    low, high = nbinom.ppf([[0.05], [0.95]], found + 0.5, 1 - risk)
+    return low, high
 
 
 @dataclass(frozen=True)
@@ -85,8 +88,10 @@ class Held:
         more = sum(row["truth.left"] > row["mines.left_high"] for row in missions)
         fewer = sum(row["truth.left"] < row["mines.left_low"] for row in missions)
         left, told = (fmean(row[name] for row in missions) for name in ("truth.left", "mines.left"))
-        plain = [(row["truth.left"], *plain_interval(row["mines.found"], row["risk.mean"])) for row in missions]
-        return cls(len(missions), left, told, more, fewer, sum(low <= left <= high for left, low, high in plain))
+        names = ("truth.left", "mines.found", "risk.mean")
+        truth, found, risk = np.array([[row[name] for row in missions] for name in names])
+        low, high = plain_intervals(found, risk)
+        return cls(len(missions), left, told, more, fewer, int(((low <= truth) & (truth <= high)).sum()))
 
     def figures(self) -> list[str]:
         """Under HEADS."""

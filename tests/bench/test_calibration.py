@@ -6,9 +6,10 @@ import re
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
-from bench.calibration import Held, contact_table, goal_table, main, plain_interval, share_interval, table
+from bench.calibration import Held, contact_table, goal_table, main, plain_intervals, share_interval, table
 
 
 def row(left: int, low: int, high: int, **varied: Any) -> dict[str, Any]:
@@ -32,11 +33,11 @@ def test_of_many_missions_the_share_is_told_to_a_tenth_of_a_per_cent() -> None:
 
 
 def test_the_plain_interval_is_that_of_those_missed_for_each_one_found() -> None:
+    (low, none), (high, no_more) = plain_intervals(np.array([10_000.0, 3.0]), np.array([1 / 3, 0.0]))
     # Of a third that is missed half a one for each one found, with a variance of a half over two thirds of them.
-    low, high = plain_interval(10_000, 1 / 3)
     assert (low + high) / 2 == pytest.approx(5_000, abs=2)
     assert high - low == pytest.approx(2 * 1.645 * (10_000 * 0.5 / (2 / 3)) ** 0.5, rel=0.01)
-    assert plain_interval(3, 0.0) == (0, 0)
+    assert (none, no_more) == (0, 0)
 
 
 def test_missions_without_targets_or_without_a_look_tell_nothing() -> None:
