@@ -65,6 +65,15 @@ def test_who_does_another_thing_than_before_or_refuses_a_strip_is_looked_at_anew
     assert has_changed()
 
 
+def test_who_comes_too_close_is_looked_for_from_now_on_and_where_nobody_was_heard_in_90_s_again() -> None:
+    node = coordinator(separation_m=15.0, idle=(), allocator=NoAllocator()).node.node
+    assert isinstance(node, Coordinator)
+    right = node._dispatch._right_of_way
+    assert right is not None
+    node._dispatch.keep_apart(1_000_000)
+    assert right.check_s == 1090.0
+
+
 def test_a_free_helper_in_the_way_of_a_primary_is_sent_to_a_place_beside_that_in_the_area() -> None:
     # The primary heads north along x = 125 m, and keeps 15 m off; a place keeps 16 m farther.
     told = coordinator(separation_m=15.0, idle=(), allocator=NoAllocator())

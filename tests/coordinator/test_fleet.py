@@ -44,14 +44,14 @@ def test_who_is_lost_or_given_up_is_told_since_when_once(caplog: pytest.LogCaptu
     caplog.set_level(logging.INFO)
     fleet = KnownFleet(run_info(400, 400), 30_000, 90_000, 0)
     primary, idle = fleet.vehicles[PRIMARY], AgentState(Mode.IDLE, 0, 1, 0, 0, 0, 0)
-    primary.hear_state(Header(PRIMARY, 0, 1, 10_000), idle, 10_000)
-    fleet.vehicles[HELPER].hear_state(Header(HELPER, 0, 1, 20_000), idle, 20_000)
-    assert fleet.find_lost(99_999) == []
-    assert fleet.find_lost(100_000) == [PRIMARY]
-    assert fleet.find_lost(110_000) == [HELPER]
-    assert fleet.find_lost(110_001) == []
+    primary.hear_state(Header(PRIMARY, 0, 1, 10_499), idle, 10_499)
+    fleet.vehicles[HELPER].hear_state(Header(HELPER, 0, 1, 20_499), idle, 20_499)
+    assert fleet.find_lost(100_498) == []
+    assert fleet.find_lost(100_499) == [PRIMARY]
+    assert fleet.find_lost(110_499) == [HELPER]
+    assert fleet.find_lost(110_500) == []
     primary.hear_state(Header(PRIMARY, 0, 2, 290_000), idle, 290_000)
-    assert fleet.find_lost(309_999) == fleet.find_lost(310_000) == []  # heard, but it does nothing
+    assert fleet.find_lost(310_498) == fleet.find_lost(310_499) == []  # heard, but it does nothing
     assert [one.getMessage() for one in caplog.records] == [
         f"{PRIMARY} is lost: nothing heard of it since 10 s",
         f"{HELPER} is lost: nothing heard of it since 20 s",

@@ -67,6 +67,14 @@ def test_a_vehicle_has_an_object_where_and_as_its_contacts_of_it_are_on_average(
         assert count(objects) == found, last_m
 
 
+def test_an_object_lies_as_surely_as_who_of_those_that_saw_it_knows_its_place_best() -> None:
+    objects = Objects()
+    # The second joins the first's object by what it may be off; the third, 10 m off, knows its place as the first does.
+    for name, x_m, sigma_m in (("helper", 0.0, 0.0), ("second", 5.0, 10.0), ("third", 10.0, 0.0)):
+        objects.hear(Sighting(name, x_m, 0.0, sigma_m, 0.8))
+    assert sorted(objects.seen().contacts.tolist()) == [1.0, 2.0]
+
+
 def test_what_one_vehicle_has_told_apart_another_does_not_join() -> None:
     objects = Objects()
     objects.hear(Sighting("helper", 0.0, 0.0, 0.0, 0.8))

@@ -46,6 +46,15 @@ def test_a_single_pair_tells_little_and_two_that_agree_nearly_all() -> None:
         assert share == pytest.approx({1: 0.57, 2: 0.99}[pairs], abs=0.02)
 
 
+def test_however_much_both_have_seen_the_guess_that_fits_all_of_it_is_taken() -> None:
+    """Of 200 things each makes it some 1,800 times as likely: more than a number can hold."""
+    places = [(200.0 * place, 0.0) for place in range(200)]
+    moved = [(east_m + 12.0, north_m - 5.0) for east_m, north_m in places]
+    told = {"helper": seen(*places, sigma_m=0.0), "primary": seen(*moved, sigma_m=20.0)}
+    frame = registered(told)["primary"]
+    assert (frame.east_m, frame.north_m, frame.sigma_m) == pytest.approx((12.0, -5.0, 0.0), abs=0.006)
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_guesses_weigh_as_bayes_rule_has_it(seed: int) -> None:
     """Five places on six, the same thing told as far apart as both have drifted, and a metre."""

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from situations import at_work, helper, open_strip, situation, situations, strip
 
-from coordinator.allocate.allocators import ALLOCATORS
+from coordinator.allocate.allocators import ALLOCATORS, checked_offers
 from coordinator.allocate.service import expected_service, removed_m2
 from coordinator.allocate.situation import Helper, OpenStrip, Situation
 from planner.currents import Sailing
@@ -183,3 +183,19 @@ def test_whatever_greedy_does_not_offer_clashes_with_an_offer_at_least_as_good(t
     assert set(found.items()) <= rates.keys()
     for (vehicle, number), rate in rates.items():
         assert max(rates[pair] for pair in found.items() if pair[0] == vehicle or pair[1] == number) >= rate
+
+
+@pytest.mark.parametrize(
+    ("answer", "wrong"),
+    [
+        ({"primary": 1}, "gives strip 1 to 'primary'; must give an open strip"),
+        ({"alpha": 3}, "gives strip 3 to 'alpha'; must give an open strip"),
+        ({"alpha": 1, "beta": 1}, "gives strip 1 to 'beta'; must give an open strip, and each once"),
+        (["alpha"], r"must answer with a mapping from vehicle to strip number, not \['alpha'\]"),
+    ],
+)
+def test_an_answer_that_gives_what_is_not_there_or_one_strip_twice_is_refused(answer: object, wrong: str) -> None:
+    told = situation([open_strip(strip(1)), open_strip(strip(2, 60))], [HELPER, replace(HELPER, vehicle="beta")])
+    assert checked_offers({"beta": 1, "alpha": 2}, told) == [("alpha", 2), ("beta", 1)]
+    with pytest.raises(ValueError, match=wrong):
+        checked_offers(answer, told)  # type: ignore[arg-type]

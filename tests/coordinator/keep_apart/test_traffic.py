@@ -483,6 +483,12 @@ class TestInATide:
         assert anew.at(20)[:2] == pytest.approx((0, -40))
         assert anew.arrives_s == pytest.approx(20 + 165)
 
+    def test_where_it_was_heard_is_held_against_where_it_was_expected_at_that_moment(self) -> None:
+        traffic, one = Traffic(), self.helper()
+        set_out = self.heard(traffic, one, Mode.TRANSIT, -100, 3000)
+        assert self.heard(traffic, one, Mode.TRANSIT, -70.1, 3020) is set_out
+        assert self.heard(traffic, one, Mode.TRANSIT, -69.9, 3020) is not set_out
+
     @pytest.mark.parametrize("drift_mps", [0.0, 1.0])
     def test_where_the_water_flows_as_is_known_it_is_where_it_was_expected_whatever_is_heard(
         self, drift_mps: float
