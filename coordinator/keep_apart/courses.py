@@ -133,8 +133,8 @@ def course(
 def lying_still(pose: Pose, from_s: float) -> Course:
     """The course of a vehicle that has not been under way yet."""
     poses = np.tile(np.array(pose, dtype=np.float64), (math.ceil(AHEAD_S / STEP_S), 1))
-    lies = DubinsPath(pose, 1.0, (0, 0, 0), (0.0, 0.0, 0.0))
-    return Course(from_s, math.ceil(from_s / STEP_S), poses, from_s, Sails(from_s, 0.0, (), lies, 0.0, None))
+    sails = Sails(from_s, 0.0, (), straight(pose, 0.0, 1.0), 0.0, None)
+    return Course(from_s, math.ceil(from_s / STEP_S), poses, from_s, sails)
 
 
 def survey_course(

@@ -27,6 +27,13 @@ FAR = [(x, y) for x in range(6, 10) for y in range(10)]
 @example(((0, 0), (0, 4), (4, 4)), {(2, 4)})
 @example(((0, 0), (4, 4), (4, 0)), {(4, 2)})
 @example(((0, 0), (4, 4), (4, 0)), {(2, 0)})
+# Of each corner both figures: where one is the least, the other is the greatest.
+@example(((0, 4), (4, 4), (4, 0)), {(1, 3)})
+@example(((4, 4), (4, 0), (0, 4)), {(1, 3)})
+@example(((4, 0), (0, 4), (4, 4)), {(1, 3)})
+@example(((0, 0), (0, 4), (4, 0)), {(1, 3)})
+@example(((0, 4), (4, 0), (0, 0)), {(1, 3)})
+@example(((4, 0), (0, 0), (0, 4)), {(1, 3)})
 # The same among many that lie elsewhere.
 @example(((0, 0), (0, 4), (4, 4)), {(0, 2), *FAR})
 @example(((0, 0), (0, 4), (4, 4)), {(2, 4), *FAR})

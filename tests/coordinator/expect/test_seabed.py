@@ -46,6 +46,15 @@ class TestByTracks:
         )
         assert share == pytest.approx(share[[15]].repeat(GRID.rows, axis=0))
 
+    def test_20_m_to_either_side_of_a_cell_are_about_it_whatever_its_size(self) -> None:
+        for cell_m, last in ((1.0, 20), (3.0, 7), (6.0, 3), (50.0, 0)):
+            grid = GridSpec(SweepFrame(0, 0, 0), cell_m, 60, 1)
+            found = np.full(grid.shape, 0.5)
+            found[0, 30] = 0.0
+            share, _ = Seabed(grid).shares(-np.log1p(-found), np.full(grid.shape, math.log(2)))
+            below = np.flatnonzero(share[0] < 1.0 - 1e-9)
+            assert (below[0], below[-1]) == (30 - last, 30 + last)
+
     def test_rows_beyond_the_edge_are_not_counted(self) -> None:
         found = np.zeros(GRID.shape)
         found[0] = 0.5

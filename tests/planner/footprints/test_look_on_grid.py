@@ -121,6 +121,8 @@ class TestByHand:
         assert not port.any()
         assert not starboard[:4].any()
         assert starboard[4:] == pytest.approx([0.2, 0.25, 0.3, 0.4, 0.5, 0.6, 0.7, 0.75, 0.8])
+        three_a_cell = over_cells(self.GRID, look_at((10, 0), NORTH, (5, 5 / 3), (1, 13)), look)
+        assert three_a_cell[1, 0, 4:] == pytest.approx([0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.85])
         finer, coarser = (look_at((10, 0), NORTH, (5, bin_m), (1, 13)) for bin_m in (0.1, 5.0))
         assert over_cells(self.GRID, finer, look)[1, 0, 4:] == pytest.approx([0.5] * 9)
         assert (over_cells(self.GRID, coarser, look) == look).all()
