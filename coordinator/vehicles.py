@@ -43,7 +43,7 @@ def expected_end_ms(
         return None
     if state.mode is Mode.RETURNING:
         return max(heard_ms, state.expected_end_ms)
-    ahead, sailing = [track for track in plan.tracks if not track.flown], sailing_of(entry, flows)
+    (_, ahead), sailing = tracks_of(plan, state), sailing_of(entry, flows)
     at_ms, pose = heard_ms, pose_of(state)
     if ahead and ahead[0].number == state.works_on and state.expected_end_ms > 0:
         at_ms = max(at_ms, state.expected_end_ms)
@@ -62,6 +62,18 @@ def expected_end_ms(
         takes_s = sailing.passes_s(passes, entry.turn_radius_m, pose, keep_out)
         takes_s -= sailing.straight_s(entry.run_in_m, passes[-1].end)
     return at_ms + round(takes_s * 1000)
+
+
+def tracks_of(plan: Plan | None, state: AgentState) -> tuple[list[PlannedTrack], list[PlannedTrack]]:
+    """The tracks that a primary has behind it, and those that it has before it, the one that it is at among these.
+
+    It says that it is at the next track before it says, in its plan, that it has flown the last: with a link much
+    sooner.
+    """
+    tracks = plan.tracks if plan is not None else ()
+    at = next((place for place, track in enumerate(tracks) if track.number == state.works_on), 0)
+    behind = [track for place, track in enumerate(tracks) if track.flown or place < at]
+    return behind, [track for track in tracks[at:] if not track.flown]
 
 
 def pose_of(state: AgentState) -> Pose:

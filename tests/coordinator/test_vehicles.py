@@ -102,12 +102,19 @@ class TestWhenASurveyEnds:
         found = self.ends_ms(state(Mode.SURVEY, 1, ends_ms=90_000), FLOWN, NORTHWARDS, BESIDE)
         assert found == pytest.approx(90_000 + takes_s * 1000, abs=1.5)
 
-    @pytest.mark.parametrize(("works_on", "says_ms"), [(1, 0), (2, 90_000)])
+    @pytest.mark.parametrize(("works_on", "says_ms"), [(1, 0), (7, 90_000)])
     def test_else_from_where_it_was_heard(self, works_on: int, says_ms: int) -> None:
         # 40 m before the run-in's beginning.
         told = state(Mode.TRANSIT, works_on, y_m=-60, ends_ms=says_ms)
         assert self.ends_ms(told, NORTHWARDS) == 10_000 + 240_000
         takes_s = (40 + 340 + math.pi * 20 + 320) / 1.5
+        assert self.ends_ms(told, NORTHWARDS, BESIDE) == pytest.approx(10_000 + takes_s * 1000, abs=1.5)
+
+    def test_who_is_at_the_second_track_has_flown_the_first_whatever_its_plan_tells_yet(self) -> None:
+        assert self.ends_ms(state(Mode.TRANSIT, 2, ends_ms=90_000), NORTHWARDS, BESIDE) == 90_000
+        # From where the run-in to the second one begins; until it says when it ends.
+        takes_s = (20 + 300) / 1.5
+        told = AgentState(Mode.TRANSIT, 2, 1, 0, 40, 320, math.pi)
         assert self.ends_ms(told, NORTHWARDS, BESIDE) == pytest.approx(10_000 + takes_s * 1000, abs=1.5)
 
     def test_in_a_current_run_out_and_turns_are_by_what_it_makes_good(self) -> None:

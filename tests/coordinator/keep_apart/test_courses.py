@@ -189,10 +189,22 @@ class TestCourses:
         entry = vehicle("primary", Role.SURVEY)
         tracks = (PlannedTrack(1, 0, 0, 0, 0, 300, True), PlannedTrack(2, 0, 80, 300, 80, 0, True))
         plan = Plan(1, (*tracks, PlannedTrack(3, 0, 160, 0, 160, 300, False)), (), (), "")
-        assert survey_run_out_left_m(entry, plan, Pose(80, -8, SOUTH)) == pytest.approx(12)
-        assert survey_run_out_left_m(entry, plan, Pose(0, 308, NORTH)) == 0
-        assert survey_run_out_left_m(entry, replace(plan, tracks=plan.tracks[2:]), Pose(80, -8, SOUTH)) == 0
-        assert survey_run_out_left_m(entry, None, Pose(80, -8, SOUTH)) == 0
+        state = AgentState(Mode.TRANSIT, 3, 1, 0, 80, -8, SOUTH)
+        assert survey_run_out_left_m(entry, plan, state) == pytest.approx(12)
+        assert survey_run_out_left_m(entry, plan, state, Pose(80, -14, SOUTH)) == pytest.approx(6)
+        assert survey_run_out_left_m(entry, plan, state, Pose(0, 308, NORTH)) == 0
+        assert survey_run_out_left_m(entry, replace(plan, tracks=plan.tracks[2:]), state) == 0
+        assert survey_run_out_left_m(entry, None, state) == 0
+
+    @pytest.mark.parametrize("told", [False, True])
+    def test_who_is_at_the_next_track_has_flown_the_last_whether_its_plan_tells_it_yet_or_not(self, told: bool) -> None:
+        entry = vehicle("primary", Role.SURVEY)
+        tracks = (PlannedTrack(1, 0, 0, 0, 0, 300, told), PlannedTrack(2, 0, 80, 300, 80, 0, False))
+        state = AgentState(Mode.TRANSIT, 2, 1, 0, 0, 300, NORTH)
+        laid = survey_course(entry, state, Plan(1, tracks, (), (), ""), 0)
+        assert laid.poses[:, 1].min() < -entry.run_in_m + 2  # by the second track alone
+        assert laid.at(entry.run_in_m / 1.5)[:2] == pytest.approx((0, 300 + entry.run_in_m))
+        assert laid.arrives_s == pytest.approx((2 * 20 + 300 + 20 + math.pi * 20 + 40) / 1.5, abs=1)
 
     def test_where_no_plan_was_told_a_primary_circles_where_it_was_heard(self) -> None:
         laid = survey_course(vehicle("primary", Role.SURVEY), AgentState(Mode.TRANSIT, 1, 1, 0, 5, 6, NORTH), None, 9)
