@@ -255,7 +255,7 @@ class Traffic:
         entry, entered = vehicle.entry, self._entered.get(vehicle.entry.vehicle)
         lefts_m = [run_out_left_m(leg.end, pose, entry.run_in_m) for leg in entered.passes] if entered else []
         on_survey_m = 0.0 if vehicle.state is None else survey_run_out_left_m(entry, vehicle.plan, vehicle.state, pose)
-        return max(*lefts_m, on_survey_m, 0.0)
+        return max([*lefts_m, on_survey_m])
 
 
 def _is_off(vehicle: KnownVehicle, laid: Course) -> bool:
