@@ -36,6 +36,8 @@ HEADS = ("missions", "left", "told", "within 90 %", "95 % of that", "more left",
 MANY = 1000
 """Missions, from which on shares are told to a tenth of a per cent."""
 GOAL_HEADS = ("missions", "reached it", "after, s", "true", "95 % of that")
+UNTIL = "mission.deadline_s"
+"""By what missions end whose goal is not waited for."""
 CONTACT_COLUMNS = (
     Column("residual risk", itemgetter("risk.mean")),
     Column("detected", lambda row: 1 - row["truth.missed_share"], 2),
@@ -120,12 +122,30 @@ def goal_table(rows: Iterable[Row], varied: Sequence[str]) -> list[str]:
         reached = [row for row in missions if row["goal.reached"]]
         figures = [str(len(missions)), str(len(reached)), "-", "-", "-"]
         if reached:
-            true = sum(bool(row["goal.true"]) for row in reached)
-            low, high = share_interval(true, len(reached))
-            ends_s = fmean(row["time.mission_s"] for row in reached)
-            figures[2:] = f"{ends_s:.0f}", f"{true / len(reached):.1%}", f"{low:.1%} to {high:.1%}"
+            figures[2:] = _how_true(reached)
         lines.append(line(values, figures))
     return head(varied, GOAL_HEADS) + lines if lines else []
+
+
+def goal_or_time_table(rows: Iterable[Row], varied: Sequence[str]) -> list[str]:
+    """The lines of the table of missions that ended with their goal or, where a `mission.deadline_s` was set, with
+    that."""
+    lines = head((*varied, UNTIL), (GOAL_HEADS[0], *GOAL_HEADS[2:]))
+    for values, missions in by(rows, (*varied, UNTIL), "goal.reached").items():
+        ended = [row for row in missions if row["goal.reached"] or values[-1] != "-"]
+        lines.append(line(values, [str(len(ended)), *_how_true(ended)]))
+    return lines
+
+
+def _how_true(ended: Sequence[Row]) -> tuple[str, str, str]:
+    """When missions ended, how many of them had their goal in truth, and the interval of that."""
+    true = sum(bool(row["goal.true"]) for row in ended)
+    low, high = share_interval(true, len(ended))
+    return (
+        f"{fmean(row['time.mission_s'] for row in ended):.0f}",
+        f"{true / len(ended):.1%}",
+        f"{low:.1%} to {high:.1%}",
+    )
 
 
 def contact_table(rows: Iterable[Row], varied: Sequence[str]) -> list[str]:

@@ -72,6 +72,14 @@ GOALS: tuple[tuple[Case, int], ...] = (
 )
 """What missions are flown for, and what they need to reach it; how many are."""
 
+ENDS = (
+    (LONGER.format(4), "mission.goal={kind: cleared, clearance: 0.9}"),
+    (LONGER.format("null"), "mission.deadline_s=5610", "mission.goal={kind: cleared, clearance: 0.9, chance: 0.9999}"),
+)
+"""With the goal, and when the missions of GOALS had reached it on average, whatever is told then."""
+OTHERWISE = ((), ("targets.count=20",), tuple(f"vehicles.{one}.sensor.p_detect=0.5" for one in ("west", "east")))
+GOAL_OR_TIME: tuple[Case, ...] = tuple(("two-helpers", (*ends, *one)) for one in OTHERWISE for ends in ENDS)
+
 SHARED = "targets.correlation={0} mission.rho={0}"
 RELIABLE: tuple[tuple[str, str], ...] = (
     ("tellaro", ""),
@@ -127,6 +135,10 @@ def _fly_goals(folder: Path) -> Document:
     for place, (case, missions) in enumerate(GOALS):
         rows += fly_overridden(folder / str(place), [case], f"1..{missions}", calibration.GOAL_FIGURES)["rows"]
     return {"rows": rows}
+
+
+def _fly_goal_or_time(folder: Path) -> Document:
+    return fly_overridden(folder, GOAL_OR_TIME, "1..40", calibration.GOAL_FIGURES)
 
 
 def _fly_cluttered(folder: Path) -> Document:
@@ -195,6 +207,11 @@ TABLES: dict[str, Table] = {
         page="docs/clearance.md",
         fly=_fly_goals,
         lines=lambda document: calibration.goal_table(document["rows"], ("scenario", "overrides")),
+    ),
+    "goal-or-time": Table(
+        page="docs/clearance.md",
+        fly=_fly_goal_or_time,
+        lines=lambda document: calibration.goal_or_time_table(document["rows"], ("p_detect", "targets.count")),
     ),
     "contacts": Table(
         page="docs/clearance.md",

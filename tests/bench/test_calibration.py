@@ -9,7 +9,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bench.calibration import Held, contact_table, goal_table, main, plain_intervals, share_interval, table
+from bench.calibration import (
+    Held,
+    contact_table,
+    goal_or_time_table,
+    goal_table,
+    main,
+    plain_intervals,
+    share_interval,
+    table,
+)
 
 
 def row(left: int, low: int, high: int, **varied: Any) -> dict[str, Any]:
@@ -103,6 +112,17 @@ def test_of_goals_it_is_told_how_often_they_are_reached_and_are_so() -> None:
     assert flown == "| `tellaro` | `-` | 3 | 3 | 2000 | 66.7% | 20.8% to 93.9% |"
     assert other == "| `tellaro` | `a=1` `b=2` | 1 | 0 | - | - | - |"
     assert goal_table([{**goal, "goal.reached": None}], ["scenario"]) == []
+
+
+def test_missions_that_end_at_a_time_are_told_beside_those_that_end_with_their_goal() -> None:
+    goal: dict[str, Any] = {"failure": None, "goal.reached": True, "goal.true": True, "time.mission_s": 1000.0}
+    missed = {**goal, "goal.reached": False, "goal.true": False, "time.mission_s": 9000.0}
+    at = {"overrides": ["mission.deadline_s=5000"], "goal.reached": False, "time.mission_s": 5000.0}
+    rows = [goal, missed, {**goal, **at}, {**missed, **at}]
+    head, _, with_goal, at_a_time = goal_or_time_table(rows, ["x"])
+    assert head == "| `x` | `mission.deadline_s` | missions | after, s | true | 95 % of that |"
+    assert with_goal == "| `-` | `-` | 1 | 1000 | 100.0% | 20.7% to 100.0% |"
+    assert at_a_time == "| `-` | `5000` | 2 | 5000 | 50.0% | 9.5% to 90.5% |"
 
 
 def test_of_contacts_it_is_told_how_right_the_list_of_mines_is() -> None:

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from bench import clearance_tables, figures, flown
+from bench.calibration import UNTIL
 from bench.clearance_tables import reliability_lines
 from bench.figures import TABLES, compared_kept, written
 from bench.flown import ROOT, Case, Mission, Table, kept
@@ -46,6 +47,7 @@ def test_what_is_declared_to_be_flown_is_what_is_kept() -> None:
         "clearance": Counter(dict.fromkeys(clearance_tables.CALIBRATED, 40)),
         "few-mines": Counter(dict.fromkeys(clearance_tables.FEW, clearance_tables.FEW_MISSIONS)),
         "goals": Counter(dict(clearance_tables.GOALS)),
+        "goal-or-time": Counter(dict.fromkeys(clearance_tables.GOAL_OR_TIME, 40)),
         "intervals": Counter(dict.fromkeys((case for case, _ in clearance_tables.MANY_TIMES), 1)),
         "reliability": Counter(
             {(one, (clearance_tables.RELIABLE_TARGETS, *told.split())): 1 for one, told in clearance_tables.RELIABLE}
@@ -120,6 +122,16 @@ def test_goals_are_as_often_true_as_a_page_says_beside_their_table() -> None:
     told = f"Of the {len(asked)} missions that told 90 %, {100 * fmean(asked):.1f} % were right"
     assert f"{told}, of those with a lane {100 * fmean(lanes):.1f} %." in words_of("docs/clearance.md")
     assert fmean(asked) >= 0.9
+
+
+def test_a_time_is_as_right_as_a_page_says_where_it_was_found_and_never_elsewhere() -> None:
+    missions = by(kept("goal-or-time")["rows"], ("p_detect", "targets.count", UNTIL), "goal.true")
+    ends_s = (fmean(row["time.mission_s"] for row in missions["-", count, "-"]) for count in ("-", "20"))
+    sooner, later = (round(one - 5610, -2) for one in ends_s)
+    assert f"is reached some {sooner:.0f} to {later:.0f} s after it could be" in words_of("docs/clearance.md")
+    assert all(fmean(row["goal.true"] for row in missions["-", count, "5610"]) >= 0.9 for count in ("-", "20"))
+    assert not any(row["goal.true"] for row in missions["0.5", "-", "5610"])
+    assert fmean(row["goal.true"] for row in missions["0.5", "-", "-"]) >= 0.9
 
 
 def test_what_a_mission_is_shown_to_say_of_the_mines_left_is_what_it_says(tmp_path: Path) -> None:
