@@ -43,7 +43,8 @@ def expected_end_ms(
         return None
     if state.mode is Mode.RETURNING:
         return max(heard_ms, state.expected_end_ms)
-    (_, ahead), sailing = tracks_of(plan, state), sailing_of(entry, flows)
+    _, ahead = tracks_of(plan, state)
+    sailing = sailing_of(entry, flows)
     at_ms, pose = heard_ms, pose_of(state)
     if ahead and ahead[0].number == state.works_on and state.expected_end_ms > 0:
         at_ms = max(at_ms, state.expected_end_ms)

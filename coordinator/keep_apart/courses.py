@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from comms.said.announcement import RosterVehicle
-from comms.said.messages import AgentState, Mode, Plan
+from comms.said.messages import AgentState, Mode, Plan, PlannedTrack
 from coordinator.vehicles import pass_of, pose_of, sailing_of, tracks_of
 from planner.currents import FlowGrid, Sailing
 from planner.dubins import DubinsPath, Pose
@@ -151,7 +151,9 @@ def survey_course(
         entry.turn_radius_m,
         sailing_of(entry, flows),
     )
-    ahead = tracks_of(plan, state)[1] if state.mode is not Mode.FINISHED else []
+    behind, ahead = tracks_of(plan, state)
+    if state.mode is Mode.FINISHED:
+        ahead = []
     if state.mode is Mode.SURVEY and ahead and ahead[0].number == state.works_on and state.expected_end_ms > 0:
         # When the track ends is known more exactly than where the vehicle was last.
         begin, end = pass_of(ahead.pop(0), entry)
@@ -161,7 +163,7 @@ def survey_course(
             left_m = run_out_left_m(end, pose, math.dist(begin[:2], end[:2])) or left_m
         pose = shifted(end[:2], end.heading_rad, -left_m)
     else:
-        left_m = survey_run_out_left_m(entry, plan, state)
+        left_m = survey_run_out_left_m(entry, behind, pose)
         end = shifted(pose[:2], pose.heading_rad, left_m)
     paths, here = [straight(pose, left_m, radius_m)], end
     for track in ahead:
@@ -208,12 +210,8 @@ def run_out_left_m(end: Pose, pose: Pose, run_in_m: float) -> float:
     return ahead_m if on_it and math.cos(pose.heading_rad - end.heading_rad) > 0.99 else 0.0
 
 
-def survey_run_out_left_m(
-    entry: RosterVehicle, plan: Plan | None, state: AgentState, pose: Pose | None = None
-) -> float:
-    """The same of the run-out behind the last track that a primary has flown, from where it was heard, or a `pose`."""
-    behind, _ = tracks_of(plan, state)
-    pose = pose_of(state) if pose is None else pose
+def survey_run_out_left_m(entry: RosterVehicle, behind: Sequence[PlannedTrack], pose: Pose) -> float:
+    """The same of the run-out behind the last of the tracks that a primary has `behind` it."""
     return run_out_left_m(pass_of(behind[-1], entry).end, pose, entry.run_in_m) if behind else 0.0
 
 

@@ -17,7 +17,7 @@ from coordinator.keep_apart.courses import (
     survey_run_out_left_m,
     sweep_course,
 )
-from coordinator.vehicles import KnownVehicle, pose_of, way_home_of
+from coordinator.vehicles import KnownVehicle, pose_of, tracks_of, way_home_of
 from planner.dubins import DubinsPath, Pose
 from planner.footprints import footprint_of
 from planner.keep_out import NOWHERE, KeepOut
@@ -254,8 +254,9 @@ class Traffic:
         track."""
         entry, entered = vehicle.entry, self._entered.get(vehicle.entry.vehicle)
         lefts_m = [run_out_left_m(leg.end, pose, entry.run_in_m) for leg in entered.passes] if entered else []
-        on_survey_m = 0.0 if vehicle.state is None else survey_run_out_left_m(entry, vehicle.plan, vehicle.state, pose)
-        return max([*lefts_m, on_survey_m])
+        assert vehicle.state is not None
+        behind, _ = tracks_of(vehicle.plan, vehicle.state)
+        return max([*lefts_m, survey_run_out_left_m(entry, behind, pose)])
 
 
 def _is_off(vehicle: KnownVehicle, laid: Course) -> bool:

@@ -128,6 +128,9 @@ def test_a_time_is_as_right_as_a_page_says_where_it_was_found_and_never_elsewher
     missions = by(kept("goal-or-time")["rows"], ("p_detect", "targets.count", UNTIL), "goal.true")
     ends_s = (fmean(row["time.mission_s"] for row in missions["-", count, "-"]) for count in ("-", "20"))
     sooner, later = (round(one - 5610, -2) for one in ends_s)
+    cleared = "mission.deadline_factor=2", "mission.goal={kind: cleared, clearance: 0.9}"
+    found_s = [row["time.mission_s"] for row in kept("goals")["rows"] if case_of(row) == ("two-helpers", cleared)]
+    assert round(fmean(found_s)) == 5610
     assert f"is reached some {sooner:.0f} to {later:.0f} s after it could be" in words_of("docs/clearance.md")
     assert all(fmean(row["goal.true"] for row in missions["-", count, "5610"]) >= 0.9 for count in ("-", "20"))
     assert not any(row["goal.true"] for row in missions["0.5", "-", "5610"])

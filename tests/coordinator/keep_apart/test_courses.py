@@ -30,6 +30,7 @@ from coordinator.keep_apart.courses import (
     sweep_course,
     too_close,
 )
+from coordinator.vehicles import tracks_of
 from planner.currents import Sailing
 from planner.dubins import DubinsPath, Pose
 from planner.keep_out import KeepOut
@@ -190,11 +191,15 @@ class TestCourses:
         tracks = (PlannedTrack(1, 0, 0, 0, 0, 300, True), PlannedTrack(2, 0, 80, 300, 80, 0, True))
         plan = Plan(1, (*tracks, PlannedTrack(3, 0, 160, 0, 160, 300, False)), (), (), "")
         state = AgentState(Mode.TRANSIT, 3, 1, 0, 80, -8, SOUTH)
-        assert survey_run_out_left_m(entry, plan, state) == pytest.approx(12)
-        assert survey_run_out_left_m(entry, plan, state, Pose(80, -14, SOUTH)) == pytest.approx(6)
-        assert survey_run_out_left_m(entry, plan, state, Pose(0, 308, NORTH)) == 0
-        assert survey_run_out_left_m(entry, replace(plan, tracks=plan.tracks[2:]), state) == 0
-        assert survey_run_out_left_m(entry, None, state) == 0
+
+        def left_m(plan: Plan | None, pose: Pose) -> float:
+            return survey_run_out_left_m(entry, tracks_of(plan, state)[0], pose)
+
+        assert left_m(plan, Pose(80, -8, SOUTH)) == pytest.approx(12)
+        assert left_m(plan, Pose(80, -14, SOUTH)) == pytest.approx(6)
+        assert left_m(plan, Pose(0, 308, NORTH)) == 0
+        assert left_m(replace(plan, tracks=plan.tracks[2:]), Pose(80, -8, SOUTH)) == 0
+        assert left_m(None, Pose(80, -8, SOUTH)) == 0
 
     @pytest.mark.parametrize("told", [False, True])
     def test_who_is_at_the_next_track_has_flown_the_last_whether_its_plan_tells_it_yet_or_not(self, told: bool) -> None:
