@@ -66,7 +66,8 @@ class Damage:
 
     `unreadable`: stretches of it, offset and length in bytes, in order. `missing`: what is known to be missing by the
     numbers of the messages. `read_until_s`: where the last of these stretches reaches to the file's end, as that was
-    cut off or is damaged, the time of the last message before it; else None.
+    cut off or is damaged, the time of the last message before it; 0 of an empty file, which has no such stretch; else
+    None.
     """
 
     unreadable: tuple[tuple[int, int], ...]
@@ -74,7 +75,7 @@ class Damage:
     read_until_s: float | None
 
     def __str__(self) -> str:
-        if self.read_until_s is not None and self.unreadable[-1][0] == 0:
+        if self.read_until_s is not None and (not self.unreadable or self.unreadable[-1][0] == 0):
             return "was cut off before its first message"
         inner = self.unreadable if self.read_until_s is None else self.unreadable[:-1]
         damaged = [_unreadable_told(inner)] if inner else []
@@ -146,7 +147,7 @@ def damage_of(found: list[Record], messages: list[Record], size: int) -> Damage 
         if one.start > end:
             unreadable.append((end, one.start - end))
         end = one.end
-    if end < size or not found:
+    if end < size:
         unreadable.append((end, size - end))
     missing, before = [], None
     for one in messages:
@@ -154,7 +155,7 @@ def damage_of(found: list[Record], messages: list[Record], size: int) -> Damage 
         if one.number > last + 1:
             missing.append(Missing(one.number - last - 1, 0.0 if before is None else before.sent_s, one.sent_s))
         before = one
-    if not unreadable and not missing:
-        return None
     until_s = None if found and end == size else 0.0 if before is None else before.sent_s
+    if not unreadable and not missing and until_s is None:
+        return None
     return Damage(tuple(unreadable), tuple(missing), until_s)

@@ -179,7 +179,10 @@ def test_an_end_that_is_damaged_is_told_apart(content: bytes, records: list[Reco
     inner = f"is damaged: {len(HEAD)} bytes at offset 0 cannot be read, no message is missing"
     assert str(damage) == f"{inner}; it {ends}"
     for at in (0, 5, len(HEAD) - 1):
-        assert str(read_damaged(content, spoilt, (at, size, b"")).damage) == "was cut off before its first message"
+        damage = read_damaged(content, spoilt, (at, size, b"")).damage
+        assert damage is not None
+        assert str(damage) == "was cut off before its first message"
+        assert damage.unreadable == (((0, at),) if at else ())
 
 
 def test_a_flipped_bit_anywhere_in_a_message_costs_this_one_alone(
