@@ -7,7 +7,7 @@ alternating sides. Closed form after Shkel and Lumelsky, Classification of the D
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -119,7 +119,7 @@ def compass_rad(angle_rad: float) -> float:
     return 0.0 if heading_rad == 2 * math.pi else heading_rad  # the remainder of a tiny negative angle is a full turn
 
 
-def shortest_path(start: Pose, end: Pose, turn_radius_m: float) -> DubinsPath:
+def shortest_path(start: Pose, end: Pose, turn_radius_m: float, first_turns: Sequence[int] = (-1, 1)) -> DubinsPath:
     """The shortest path from one pose to another for a vehicle that only goes ahead.
 
     Of two paths equally long, to within TIE_M, the one that first turns to port is taken.
@@ -128,6 +128,7 @@ def shortest_path(start: Pose, end: Pose, turn_radius_m: float) -> DubinsPath:
         start: where the path begins.
         end: where it ends; any compass headings.
         turn_radius_m: the tightest turn, > 0.
+        first_turns: which way it may first turn, -1 for to port and 1 for to starboard.
 
     Raises:
         ValueError: a number is not finite, or the turn radius not above 0.
@@ -142,7 +143,7 @@ def shortest_path(start: Pose, end: Pose, turn_radius_m: float) -> DubinsPath:
     # Headings against the line from start to end, counted to port.
     alpha, beta = bearing_rad - start.heading_rad, bearing_rad - end.heading_rad
     best, turns, arcs = math.inf, (-1, 0, -1), (0.0, 0.0, 0.0)
-    for side in (-1, 1):
+    for side in first_turns:
         for total, middle, last, word in _words(distance, -side * alpha, -side * beta):
             if total < best - (_TOLERANCE if side == turns[0] else TIE_M / turn_radius_m):
                 best, turns, arcs = total, (side, side * middle, side * last), word

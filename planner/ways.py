@@ -60,6 +60,12 @@ def _way_round(start: Pose, end: Pose, turn_radius_m: float, keep_out: KeepOut) 
     here, there = start[:2], end[:2]
     if not keep_out.are_clear(shapely.points([here, there])).all() or keep_out.are_parted(here, there):
         return None
+    # Of the paths that first turn to port and to starboard one may stay out where the other, as short, does not.
+    to_sides = [shortest_path(start, end, turn_radius_m, (side,)) for side in (-1, 1)]
+    least_m = min(path.length_m for path in to_sides)
+    for path in to_sides:
+        if path.length_m <= least_m + TIE_M and keep_out.is_clear([path]):
+            return (path,)
     graph = _graph(keep_out, turn_radius_m)
     for first_m, last_m in sorted(
         ((one * turn_radius_m, other * turn_radius_m) for one in STRAIGHT_FIRST for other in STRAIGHT_FIRST), key=sum

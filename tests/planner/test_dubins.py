@@ -158,6 +158,16 @@ class TestProperties:
         assert -1e-6 <= length_m - shortest_word_m(start, end, radius_m) <= TIE_M + 1e-6
 
     @given(poses, poses, radii)
+    def test_is_one_of_the_shortest_that_first_turn_to_either_side(
+        self, start: Pose, end: Pose, radius_m: float
+    ) -> None:
+        sides = {side: shortest_path(start, end, radius_m, (side,)) for side in (-1, 1)}
+        assert all(path.turns[0] == side for side, path in sides.items())
+        path = shortest_path(start, end, radius_m)
+        assert path == sides[path.turns[0]]
+        assert path.length_m <= min(one.length_m for one in sides.values()) + TIE_M
+
+    @given(poses, poses, radii)
     def test_is_no_shorter_than_the_straight_line_or_the_turn(self, start: Pose, end: Pose, radius_m: float) -> None:
         path = shortest_path(start, end, radius_m)
         assert path.length_m >= math.hypot(end.x_m - start.x_m, end.y_m - start.y_m) - 1e-9

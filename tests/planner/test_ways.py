@@ -264,6 +264,17 @@ def test_of_two_ways_equally_long_that_to_port_is_taken(turned_rad: float) -> No
     assert way.length_m == pytest.approx(2 * math.pi * 19.73 + math.dist(start[:2], end[:2]), abs=0.005)
 
 
+def test_of_two_paths_as_short_that_turn_thrice_the_one_is_taken_that_stays_out() -> None:
+    start, end = Pose(7, 0, NORTH), Pose(-16, 19, NORTH)
+    to_port, to_starboard = (shortest_path(start, end, RADIUS_M, (side,)) for side in (-1, 1))
+    assert to_port.length_m == pytest.approx(to_starboard.length_m)
+    assert (to_port.turns, to_starboard.turns) == ((-1, 1, -1), (1, -1, 1))
+    for turns, taken in ((to_port, to_starboard), (to_starboard, to_port)):
+        x_m, y_m, _ = turns.pose_at(turns.length_m / 2)
+        post = ((x_m, y_m), (x_m + 0.1, y_m), (x_m, y_m + 0.1))
+        assert shortest_way(start, end, RADIUS_M, KeepOut((post,), 0.5)) == (taken,)
+
+
 class TestNoWay:
     RING = KeepOut(
         (
@@ -313,6 +324,8 @@ def test_every_way_stays_out_keeps_the_radius_and_arrives(
 @settings(max_examples=60)
 @given(kept_out, places, places)
 @example(SQUARE, Pose(-100, 0, EAST), Pose(55, -40, NORTH))  # beside a wall, where the first line found is too steep
+# Of two that turn thrice, as short as each other, one leads through the zone.
+@example(KeepOut((((15.0, -7.0), (-7.5, 5.99), (-7.5, -19.99)),), MARGIN_M), Pose(7, 0, NORTH), Pose(-16, 19, NORTH))
 def test_a_way_back_is_as_long(keep_out: KeepOut, start: Pose, end: Pose) -> None:
     there = shortest_way(start, end, RADIUS_M, keep_out)
     first, last = (Pose(one.x_m, one.y_m, one.heading_rad + math.pi) for one in (end, start))
