@@ -16,9 +16,12 @@ from planner.types import BoolArray, FloatArray, GridSpec, Point
 NumberArray = NDArray[np.int32]
 IndexArray = NDArray[np.intp]
 Window = tuple[slice, slice]
+"""Some rows and columns."""
 
 MOST_VERTICES = 40
 """An outline has no more."""
+BLOCK_M = 500.0
+"""Side of the blocks at whose borders patches are cut, if nothing else is said."""
 
 
 @dataclass(frozen=True)
@@ -55,35 +58,52 @@ class _Cells:
             return slice(0, rows), slice(0, columns)
         differs = (self.risk != before.risk) | (self.hot != before.hot)
         differs |= self.hot & (self.beside_unsettled != before.beside_unsettled)
-        if not differs.any():
-            return None
-        return self._blocks(differs.any(axis=1)), self._blocks(differs.any(axis=0))
+        return _blocks(differs, self.block) if differs.any() else None
 
-    def _blocks(self, differs: BoolArray) -> slice:
-        """From the first to the last block that holds one of these rows, or columns."""
-        (places,) = differs.nonzero()
-        first, last = (int(place) // self.block for place in (places[0], places[-1]))
-        return slice(first * self.block, min((last + 1) * self.block, differs.size))
+
+def blocks_about(grid: GridSpec, inside: BoolArray, block_m: float = BLOCK_M) -> Window:
+    """The rows and columns of the whole blocks, see `update_hotspots`, that hold all cells `inside`, shape
+    `grid.shape`; none where there is no such cell."""
+    return _blocks(inside, _cells_a_block(grid, block_m)) if inside.any() else (slice(0, 0), slice(0, 0))
+
+
+def _cells_a_block(grid: GridSpec, block_m: float) -> int:
+    return max(1, int(block_m / grid.cell_m))
+
+
+def _blocks(cells: BoolArray, block: int) -> Window:
+    """From the first to the last block, of so many cells a side, that holds any of these."""
+    rows, columns = (np.flatnonzero(cells.any(axis=axis)) for axis in (1, 0))
+    rows_from, rows_to, columns_from, columns_to = (
+        int(place) // block * block for place in (rows[0], rows[-1], columns[0], columns[-1])
+    )
+    return (
+        slice(rows_from, min(rows_to + block, cells.shape[0])),
+        slice(columns_from, min(columns_to + block, cells.shape[1])),
+    )
 
 
 @dataclass(frozen=True, eq=False)
 class HotspotMap:
     """The hotspots at one time.
 
-    `numbers`: which hotspot each cell belongs to, shape `grid.shape`, 0 for none; `hotspots`: by number;
-    `next_number`: the number that the next new one gets, above all that were ever given; `made_of`: what all that
-    follows from, None before the first update.
+    `window`: the rows and columns of the grid in which there may be any; `numbers`: which hotspot each cell there
+    belongs to, shape of the window, 0 for none; `hotspots`: by number; `next_number`: the number that the next new one
+    gets, above all that were ever given; `made_of`: what all that follows from, None before the first update.
     """
 
+    window: Window
     numbers: NumberArray
     hotspots: Mapping[int, Hotspot] = field(default_factory=lambda: MappingProxyType({}))
     next_number: int = 1
     made_of: _Cells | None = None
 
     @classmethod
-    def empty(cls, grid: GridSpec) -> HotspotMap:
-        """The map before the first hotspot."""
-        return cls(np.zeros(grid.shape, dtype=np.int32))
+    def empty(cls, grid: GridSpec, window: Window | None = None) -> HotspotMap:
+        """The map before the first hotspot; of all of the grid where no window is named."""
+        rows, columns = grid.shape
+        window = window or (slice(0, rows), slice(0, columns))
+        return cls(window, np.zeros(tuple(one.stop - one.start for one in window), dtype=np.int32))
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,10 +126,10 @@ def update_hotspots(
     risk: FloatArray,
     previous: HotspotMap,
     *,
-    block_m: float = 500.0,
+    block_m: float = BLOCK_M,
     least_area_m2: float = 400.0,
 ) -> HotspotUpdate:
-    """The hotspots in a map, carried on from those before.
+    """The hotspots in the window of a map that those before are of, carried on from these.
 
     A hotspot is a patch of hot cells that touch by their sides. Patches are cut at the borders of blocks, so that one
     hotspot stays small enough for one revisit. A patch keeps the number that most of its cells had (of equals the
@@ -119,21 +139,21 @@ def update_hotspots(
 
     Args:
         grid: the cells.
-        hot: the cells that are settled, inside and at or above the threshold of risk, shape `grid.shape`.
+        hot: the cells that are settled, inside and at or above the threshold of risk, shape of the window.
         unsettled: the cells inside that are not settled, same shape.
         risk: residual risk, same shape.
         previous: what the last update gave, or `HotspotMap.empty`.
-        block_m: side of the square blocks, counted in whole cells from the grid's first, > 0.
+        block_m: side of the square blocks, counted in whole cells from the window's first, > 0.
         least_area_m2: smaller patches are left out.
 
     Raises:
-        ValueError: an array has another shape than the grid, or `block_m` is not finite and above 0.
+        ValueError: an array has another shape than the window, or `block_m` is not finite and above 0.
     """
-    if not hot.shape == unsettled.shape == risk.shape == previous.numbers.shape == grid.shape:
-        raise ValueError(f"hotspots need arrays of the grid's shape, {grid.shape}")
+    if not hot.shape == unsettled.shape == risk.shape == previous.numbers.shape:
+        raise ValueError(f"hotspots need arrays of the window's shape, {previous.numbers.shape}")
     if not 0 < block_m < np.inf:
         raise ValueError(f"a block's side must be finite and above 0, not {block_m} m")
-    block = max(1, int(block_m / grid.cell_m))
+    block, (rows, columns) = _cells_a_block(grid, block_m), previous.window
     cells = _Cells(hot.copy(), np.where(hot, risk, 0.0), neighbours(unsettled), block, least_area_m2)
     # No patch reaches from one block into another, so that where nothing is new they are what they were.
     window = cells.news(previous.made_of)
@@ -146,7 +166,7 @@ def update_hotspots(
     outlines = {
         number: previous.hotspots[number].outline
         if number in previous.hotspots and number not in reshaped
-        else _outline(grid, *patches.cells(label))
+        else _outline(grid, *patches.cells(label, rows.start, columns.start))
         for label, number in number_of.items()
     }
     told = patches.told(number_of, outlines)
@@ -156,7 +176,7 @@ def update_hotspots(
     numbers[window] = numbers_there
     hotspots = {number: one for number, one in previous.hotspots.items() if number not in gone} | told
     return HotspotUpdate(
-        HotspotMap(numbers, MappingProxyType(hotspots), next_number, cells),
+        HotspotMap(previous.window, numbers, MappingProxyType(hotspots), next_number, cells),
         tuple(sorted(changed, key=lambda hotspot: hotspot.number)),
         {number: _heir(numbers_there[before == number]) for number in _by_first_cell(gone, before)},
     )
@@ -204,11 +224,12 @@ class _Patches:
             for label, number in number_of.items()
         }
 
-    def cells(self, label: int) -> tuple[IndexArray, IndexArray]:
-        """The rows and columns of one patch's cells, as the grid counts them."""
+    def cells(self, label: int, first_row: int, first_column: int) -> tuple[IndexArray, IndexArray]:
+        """The rows and columns of one patch's cells, as the grid counts them, in which the window lies from these
+        on."""
         rows, columns = self.window
         its_rows, its_columns = np.divmod(self.occupied[self.labels_there == label], columns.stop - columns.start)
-        return its_rows + rows.start, its_columns + columns.start
+        return its_rows + (first_row + rows.start), its_columns + (first_column + columns.start)
 
 
 def _numbered(patches: _Patches, before: NumberArray, next_number: int) -> tuple[NumberArray, dict[int, int], int]:

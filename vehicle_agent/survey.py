@@ -28,7 +28,7 @@ from planner.first_plan import parts_in_order
 from planner.flyable import flyable_pieces
 from planner.footprints.cells import Ahead, cells_within, settled_cells
 from planner.footprints.footprint import Reach
-from planner.hotspots import HotspotMap, update_hotspots
+from planner.hotspots import HotspotMap, blocks_about, update_hotspots
 from planner.profile_spacing import Known, SpacingTerms, known_before
 from planner.risk import HIGHEST_P_DETECT, residual_risk
 from planner.spacing_planners import SpacingDecision
@@ -80,7 +80,7 @@ class SurveyAgent(Agent):
             region = region.share(*self.config.share, self._grid.frame.heading_rad)
         self._inside = region.inside(self._grid)
         self._rho = run.rho
-        self._hotspots = HotspotMap.empty(self._grid)
+        self._hotspots = HotspotMap.empty(self._grid, blocks_about(self._grid, self._inside))
         if self.config.prior is not None:
             self._publish_prior(self.config.prior)
         sonar, begin = (self.config.nadir_gap_m, self.config.range_m), self.config.begin
@@ -338,15 +338,17 @@ class SurveyAgent(Agent):
             return
         if self._reach is None:
             return
-        ahead = [self._still_ahead(track) for track in (*self.ahead, *self.later)]
-        settled = self._inside & settled_cells(self._grid, ahead, self._reach)
+        ahead, window = [self._still_ahead(track) for track in (*self.ahead, *self.later)], self._hotspots.window
+        settled = np.zeros(self._grid.shape, dtype=np.bool_)
+        there = settled[window]
+        np.logical_and(self._inside[window], settled_cells(self._grid, ahead, self._reach, window), out=there)
         part, far_m = self._parts[self._part], self._reach.far_m
         r_eff_m = self.r_eff_m[-1] if self.r_eff_m else None
         frontier_m = part.frontier_m(self.ahead, self._reach, r_eff_m, self._grid.cell_m)
         if frontier_m is not None:
-            settled &= ~self._cells_within(part, frontier_m, far_m)
+            there &= ~self._cells_within(part, frontier_m, far_m)
         for later in self._parts[self._part + 1 :]:
-            settled &= ~self._cells_within(later, -far_m, far_m)
+            there &= ~self._cells_within(later, -far_m, far_m)
         self.coverage.settled = settled
 
     def _still_ahead(self, track: Track) -> Ahead:
@@ -361,21 +363,22 @@ class SurveyAgent(Agent):
         return Ahead(self._across_m(track), min(from_m, end_m), max(from_m, end_m))
 
     def _cells_within(self, part: PartSurvey, from_across_m: float, beyond_m: float) -> BoolArray:
-        """Cells that tracks over a part, from an offset on, may see."""
+        """Cells of the window about the area that tracks over a part, from an offset on, may see."""
         margin_m = self._grid.cell_m + self._along_bin_m + self.footprint.ahead_m
         across_m = (from_across_m, part.area.width_m + beyond_m)
-        return cells_within(self._grid, part.area.frame, across_m, (-margin_m, part.area.length_m + margin_m))
+        along_m = (-margin_m, part.area.length_m + margin_m)
+        return cells_within(self._grid, part.area.frame, across_m, along_m, self._hotspots.window)
 
     def _find_hotspots(self, now_ms: int) -> None:
         assert self.coverage is not None
         self._new_looks = False
         self._hotspots_due_ms = now_ms + HOTSPOTS_EVERY_MS
         self._settle()
-        layer = self.coverage.layer
-        risk = residual_risk(layer.sum_levels, layer.largest_levels, self._rho)
-        hot = self.coverage.settled & (risk >= self.config.hotspot_risk)
-        unsettled = self._inside & ~self.coverage.settled
-        update = update_hotspots(self.coverage.grid, hot, unsettled, risk, self._hotspots)
+        layer, window = self.coverage.layer, self._hotspots.window
+        settled = self.coverage.settled[window]
+        risk = residual_risk(layer.sum_levels[window], layer.largest_levels[window], self._rho)
+        hot = settled & (risk >= self.config.hotspot_risk)
+        update = update_hotspots(self._grid, hot, self._inside[window] & ~settled, risk, self._hotspots)
         self._hotspots = update.map
         for hotspot in update.changed:
             outline = tuple(Vertex(x_m, y_m) for x_m, y_m in hotspot.outline)

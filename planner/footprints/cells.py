@@ -103,23 +103,34 @@ class Ahead:
     to_m: float
 
 
-def settled_cells(grid: GridSpec, ahead: Iterable[Ahead], reach: Reach) -> BoolArray:
-    """Cells that none of these can see, shape grid.shape. One cell of margin is kept about what they see."""
-    settled = np.ones(grid.shape, dtype=np.bool_)
+ALL = slice(None), slice(None)
+"""Rows and columns: those of the whole grid."""
+
+
+def settled_cells(grid: GridSpec, ahead: Iterable[Ahead], reach: Reach, window: tuple[slice, slice] = ALL) -> BoolArray:
+    """Cells of a window of the grid that none of these can see, shape of the window. One cell of margin is kept about
+    what they see."""
+    its_along_m, its_across_m = grid.along_m[window[0]], grid.across_m[window[1]]
+    settled = np.ones((its_along_m.size, its_across_m.size), dtype=np.bool_)
     for one in ahead:
-        distance_m = np.abs(grid.across_m - one.across_m)
+        distance_m = np.abs(its_across_m - one.across_m)
         columns = (distance_m >= reach.near_m - grid.cell_m) & (distance_m <= reach.far_m + grid.cell_m)
-        first = np.searchsorted(grid.along_m, one.from_m - grid.cell_m, side="right")
-        behind_last = np.searchsorted(grid.along_m, one.to_m + grid.cell_m)
+        first = np.searchsorted(its_along_m, one.from_m - grid.cell_m, side="right")
+        behind_last = np.searchsorted(its_along_m, one.to_m + grid.cell_m)
         settled[first:behind_last, columns] = False
     return settled
 
 
 def cells_within(
-    grid: GridSpec, frame: SweepFrame, across_m: tuple[float, float], along_m: tuple[float, float]
+    grid: GridSpec,
+    frame: SweepFrame,
+    across_m: tuple[float, float],
+    along_m: tuple[float, float],
+    window: tuple[slice, slice] = ALL,
 ) -> BoolArray:
-    """Cells with their centre in a rectangle of another sweep frame, without its sides; shape grid.shape."""
-    u_m, v_m = _centres_in(frame, grid)
+    """Cells of a window of the grid with their centre in a rectangle of another sweep frame, without its sides; shape
+    of the window."""
+    u_m, v_m = (one[window] for one in _centres_in(frame, grid))
     within: BoolArray = (u_m > across_m[0]) & (u_m < across_m[1]) & (v_m > along_m[0]) & (v_m < along_m[1])
     return within
 

@@ -12,7 +12,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planner.hotspots import Hotspot, HotspotMap, HotspotUpdate, update_hotspots
+from planner.hotspots import Hotspot, HotspotMap, HotspotUpdate, blocks_about, update_hotspots
 from planner.types import BoolArray, FloatArray, GridSpec, SweepFrame
 
 GRID = GridSpec(SweepFrame(100, 200, 0), 5, columns=12, rows=6)
@@ -348,9 +348,57 @@ class TestProperties:
         assert set(before.hotspots) <= set(now.map.hotspots) | set(now.withdrawn)
 
 
+class TestWindows:
+    GRID = GridSpec(SweepFrame(-30, 70, 0.6), 5, columns=33, rows=21)
+
+    @pytest.mark.parametrize(
+        ("cells", "window"),
+        [  # blocks of 4 cells; the last ones have 1
+            ([(0, 0)], (slice(0, 4), slice(0, 4))),
+            ([(3, 4)], (slice(0, 4), slice(4, 8))),
+            ([(4, 3), (11, 8)], (slice(4, 12), slice(0, 12))),
+            ([(20, 32)], (slice(20, 21), slice(32, 33))),
+            ([], (slice(0, 0), slice(0, 0))),
+        ],
+    )
+    def test_whole_blocks_lie_about_all_cells(self, cells: list[tuple[int, int]], window: tuple[slice, slice]) -> None:
+        inside = np.zeros(self.GRID.shape, dtype=np.bool_)
+        for one in cells:
+            inside[one] = True
+        assert blocks_about(self.GRID, inside, block_m=24.9) == window
+
+    def test_where_no_cell_is_inside_there_are_no_hotspots(self) -> None:
+        window = blocks_about(self.GRID, np.zeros(self.GRID.shape, dtype=np.bool_))
+        none = np.zeros((0, 0), dtype=np.bool_)
+        found = update_hotspots(self.GRID, none, none, np.zeros((0, 0)), HotspotMap.empty(self.GRID, window))
+        assert (found.changed, found.withdrawn, found.map.numbers.shape) == ((), {}, (0, 0))
+
+    @given(st.integers(0, 1_000_000), st.sampled_from([(0, 1), (2, 3), (1, 5)]), st.sampled_from([(0, 3), (3, 7)]))
+    def test_a_window_of_blocks_that_holds_all_has_the_hotspots_of_the_whole_grid(
+        self, seed: int, rows: tuple[int, int], columns: tuple[int, int]
+    ) -> None:
+        rng, block_m, terms = np.random.default_rng(seed), 25, {"block_m": 25.0, "least_area_m2": 50.0}
+        inside = np.zeros(self.GRID.shape, dtype=np.bool_)
+        inside[5 * rows[0] : 5 * rows[1], 5 * columns[0] : 5 * columns[1]] = True
+        window = blocks_about(self.GRID, inside, block_m)
+        whole, part = HotspotMap.empty(self.GRID), HotspotMap.empty(self.GRID, window)
+        for _ in range(4):
+            hot = inside & (rng.random(self.GRID.shape) < 0.6)
+            unsettled = inside & ~hot & (rng.random(self.GRID.shape) < 0.3)
+            risk = rng.random(self.GRID.shape)
+            of_whole = update_hotspots(self.GRID, hot, unsettled, risk, whole, **terms)
+            of_part = update_hotspots(self.GRID, hot[window], unsettled[window], risk[window], part, **terms)
+            assert of_part.changed == of_whole.changed
+            assert of_part.withdrawn == of_whole.withdrawn
+            whole, part = of_whole.map, of_part.map
+            assert part.hotspots == whole.hotspots
+            assert (part.numbers == whole.numbers[window]).all()
+            assert part.numbers.any()
+
+
 class TestRefusals:
     def test_of_arrays_of_another_shape(self) -> None:
-        with pytest.raises(ValueError, match=r"the grid's shape, \(6, 12\)"):
+        with pytest.raises(ValueError, match=r"the window's shape, \(6, 12\)"):
             update_hotspots(GRID, NONE[1:], NONE, RISK, HotspotMap.empty(GRID))
 
     @pytest.mark.parametrize("block_m", [0, -5, math.nan, math.inf])

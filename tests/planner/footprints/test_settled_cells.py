@@ -101,6 +101,15 @@ class TestByHand:
             (j, i) for j in range(16, 20) for i in (118, 119, 120)
         ]
 
+    def test_a_window_tells_of_its_own_cells(self) -> None:
+        window, turned = (slice(4, 17), slice(10, 119)), SweepFrame(600, 100, math.pi)
+        ahead = [Ahead(200, 30, 50), rest(300, 40, ascending=True)]
+        settled, within = settled_cells(GRID, ahead, REACH), cells_within(GRID, turned, (-1, 14), (0, 20))
+        assert not settled[window].all()
+        assert settled_cells(GRID, ahead, REACH, window).tolist() == settled[window].tolist()
+        assert within[window].any()
+        assert cells_within(GRID, turned, (-1, 14), (0, 20), window).tolist() == within[window].tolist()
+
 
 offsets = st.lists(st.integers(-50, 650).map(float), max_size=5)
 reaches = st.tuples(st.integers(0, 60), st.integers(0, 120)).map(lambda r: Reach(float(r[0]), float(r[0] + r[1])))
