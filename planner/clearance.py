@@ -23,8 +23,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from planner.contacts import ObjectsOnMap, SeenObjects, are_listed
-from planner.fleet_map import EVERYWHERE
-from planner.types import BoolArray, DetectionCurve, FloatArray, GridSpec
+from planner.types import EVERYWHERE, BoolArray, DetectionCurve, FloatArray, GridSpec
 
 PRIOR_MINES = 0.5
 """The gamma prior's shape, at a rate of 0: Jeffreys' prior of a Poisson process, half a mine found at any density."""

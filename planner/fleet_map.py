@@ -18,11 +18,10 @@ from numpy.typing import NDArray
 
 from planner.risk import MOST_LEVELS, NATS_PER_LEVEL, LevelArray, residual_risk, risk_of_levels
 from planner.tiles import tile_shape
-from planner.types import BoolArray, FloatArray, GridSpec
+from planner.types import EVERYWHERE, BoolArray, FloatArray, GridSpec, Window
 
 PARTS = 16  # of a level: half of one is less than a thousandth of the residual risk
 MOST_STARTS = 8  # that are told apart, of each tile
-EVERYWHERE = (slice(None), slice(None))
 CLOSED = 2**31  # a version above all that are told: nothing newer is taken
 
 Place = tuple[int, int]
@@ -56,7 +55,7 @@ class VehicleLayer:
             told=np.zeros(grid.shape, dtype=np.bool_),
         )
 
-    def take(self, place: Place, window: tuple[slice, slice], incarnation: int, tile: ToldTile) -> bool:
+    def take(self, place: Place, window: Window, incarnation: int, tile: ToldTile) -> bool:
         """Takes a start's tile, whose cells are the window's; returns whether it was news."""
         versions = self.versions.setdefault(place, {})
         oldest = min(versions, default=incarnation)
@@ -74,7 +73,7 @@ class VehicleLayer:
         self.told[window] = True
         return True
 
-    def _with_other_starts(self, place: Place, window: tuple[slice, slice], incarnation: int, told: ToldTile) -> _Told:
+    def _with_other_starts(self, place: Place, window: Window, incarnation: int, told: ToldTile) -> _Told:
         """What a start has told, now, joined with what the others have."""
         apart = self._apart.get(place)
         if apart is None:  # so far one alone has told of it
@@ -147,7 +146,7 @@ class FleetMap:
         self.changes = 0
         self._unseen: LevelArray = np.broadcast_to(np.uint8(0), grid.shape)  # takes no memory
         self._risk: FloatArray | None = None  # that of a large map is only held where it is asked for
-        self._changed: dict[Place, tuple[slice, slice]] = {}  # windows of tiles that _risk does not tell yet
+        self._changed: dict[Place, Window] = {}  # windows of tiles that _risk does not tell yet
 
     @property
     def risk(self) -> FloatArray:
@@ -198,7 +197,7 @@ class FleetMap:
             seen |= layer.sum_levels > 0
         return seen
 
-    def settled_by(self, vehicles: Iterable[str], window: tuple[slice, slice] = EVERYWHERE) -> BoolArray:
+    def settled_by(self, vehicles: Iterable[str], window: Window = EVERYWHERE) -> BoolArray:
         """Cells of a window that one of these vehicles has declared settled."""
         settled: BoolArray = np.zeros(self._unseen[window].shape, dtype=np.bool_)
         for vehicle in vehicles:
@@ -223,9 +222,7 @@ class FleetMap:
         risk, sums = self._joined(EVERYWHERE, list(layers))
         return risk, sums > 0
 
-    def levels_within(
-        self, window: tuple[slice, slice], vehicles: Iterable[str]
-    ) -> tuple[NDArray[np.intp], FloatArray]:
+    def levels_within(self, window: Window, vehicles: Iterable[str]) -> tuple[NDArray[np.intp], FloatArray]:
         """Levels in a window of which these vehicles alone have told, and the residual risk of each level from 0 on:
         `risk` there, worked out anew, in a form that is quickly counted and coloured.
 
@@ -239,15 +236,13 @@ class FleetMap:
         counting = self.rho * largest + (1.0 - self.rho) * sums
         return np.rint(PARTS * counting).astype(np.intp), risk_of_levels(most, PARTS)
 
-    def _joined(
-        self, window: tuple[slice, slice], layers: Sequence[VehicleLayer]
-    ) -> tuple[FloatArray, NDArray[np.unsignedinteger]]:
+    def _joined(self, window: Window, layers: Sequence[VehicleLayer]) -> tuple[FloatArray, NDArray[np.unsignedinteger]]:
         """Residual risk and summed levels from these layers."""
         sums, largest = self._summed(window, layers)
         return residual_risk(sums, largest, self.rho), sums
 
     def _summed(
-        self, window: tuple[slice, slice], layers: Sequence[VehicleLayer]
+        self, window: Window, layers: Sequence[VehicleLayer]
     ) -> tuple[NDArray[np.unsignedinteger], NDArray[np.unsignedinteger]]:
         """Sums and maxima of these layers' levels; without a `rho` the sums alone count, and stand for both."""
         sums = self._unseen[window].astype(np.min_scalar_type(MOST_LEVELS * len(layers)))

@@ -11,12 +11,10 @@ from numpy.typing import NDArray
 
 from planner.groups import label_groups, neighbours
 from planner.outline import outline
-from planner.types import BoolArray, FloatArray, GridSpec, Point
+from planner.types import BoolArray, FloatArray, GridSpec, Point, Window
 
 NumberArray = NDArray[np.int32]
 IndexArray = NDArray[np.intp]
-Window = tuple[slice, slice]
-"""Some rows and columns."""
 
 MOST_VERTICES = 40
 """An outline has no more."""
@@ -147,13 +145,19 @@ def update_hotspots(
         least_area_m2: smaller patches are left out.
 
     Raises:
-        ValueError: an array has another shape than the window, or `block_m` is not finite and above 0.
+        ValueError: an array has another shape than the window, the window does not lie in the grid, or `block_m` is not
+            finite and above 0.
     """
     if not hot.shape == unsettled.shape == risk.shape == previous.numbers.shape:
         raise ValueError(f"hotspots need arrays of the window's shape, {previous.numbers.shape}")
+    rows, columns = previous.window
+    if rows.stop > grid.rows or columns.stop > grid.columns:
+        raise ValueError(
+            f"hotspots need a window of the grid's {grid.shape} cells, not one to {rows.stop, columns.stop}"
+        )
     if not 0 < block_m < np.inf:
         raise ValueError(f"a block's side must be finite and above 0, not {block_m} m")
-    block, (rows, columns) = _cells_a_block(grid, block_m), previous.window
+    block = _cells_a_block(grid, block_m)
     cells = _Cells(hot.copy(), np.where(hot, risk, 0.0), neighbours(unsettled), block, least_area_m2)
     # No patch reaches from one block into another, so that where nothing is new they are what they were.
     window = cells.news(previous.made_of)

@@ -9,7 +9,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from planner.types import BoolArray, FloatArray, GridSpec, Point
+from planner.types import BoolArray, FloatArray, GridSpec, Point, Window
 
 TILE_CELLS = 20  # 20 x 20 cells in two channels and a mask stay under 1 kB
 
@@ -21,7 +21,7 @@ class Tile:
     name: str
     first_row: int
     first_column: int
-    window: tuple[slice, slice]
+    window: Window
 
     def __hash__(self) -> int:
         return hash((self.first_row, self.first_column))

@@ -18,6 +18,9 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 Point = tuple[float, float]
+Window = tuple[slice, slice]
+"""Some rows and columns of a grid."""
+EVERYWHERE: Window = (slice(None), slice(None))
 OneOrMany = TypeVar("OneOrMany", float, FloatArray)
 
 

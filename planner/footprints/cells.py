@@ -10,7 +10,7 @@ from functools import lru_cache
 import numpy as np
 
 from planner.footprints.footprint import Reach
-from planner.types import BoolArray, FloatArray, GridSpec, LookGeometry, SweepFrame, Track
+from planner.types import EVERYWHERE, BoolArray, FloatArray, GridSpec, LookGeometry, SweepFrame, Track, Window
 
 EDGE_TOLERANCE_M = 1e-3
 """A cell centre this close before a bin's edge, or to the edge of what is seen, counts as on it: positions travel in
@@ -103,11 +103,7 @@ class Ahead:
     to_m: float
 
 
-ALL = slice(None), slice(None)
-"""Rows and columns: those of the whole grid."""
-
-
-def settled_cells(grid: GridSpec, ahead: Iterable[Ahead], reach: Reach, window: tuple[slice, slice] = ALL) -> BoolArray:
+def settled_cells(grid: GridSpec, ahead: Iterable[Ahead], reach: Reach, window: Window = EVERYWHERE) -> BoolArray:
     """Cells of a window of the grid that none of these can see, shape of the window. One cell of margin is kept about
     what they see."""
     its_along_m, its_across_m = grid.along_m[window[0]], grid.across_m[window[1]]
@@ -126,7 +122,7 @@ def cells_within(
     frame: SweepFrame,
     across_m: tuple[float, float],
     along_m: tuple[float, float],
-    window: tuple[slice, slice] = ALL,
+    window: Window = EVERYWHERE,
 ) -> BoolArray:
     """Cells of a window of the grid with their centre in a rectangle of another sweep frame, without its sides; shape
     of the window."""

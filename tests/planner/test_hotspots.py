@@ -401,6 +401,12 @@ class TestRefusals:
         with pytest.raises(ValueError, match=r"the window's shape, \(6, 12\)"):
             update_hotspots(GRID, NONE[1:], NONE, RISK, HotspotMap.empty(GRID))
 
+    @pytest.mark.parametrize(("columns", "rows"), [(11, 6), (12, 5)])
+    def test_of_a_window_of_another_grid(self, columns: int, rows: int) -> None:
+        smaller = replace(GRID, columns=columns, rows=rows)
+        with pytest.raises(ValueError, match=rf"the grid's \({rows}, {columns}\) cells, not one to \(6, 12\)"):
+            update_hotspots(smaller, NONE, NONE, RISK, HotspotMap.empty(GRID))
+
     @pytest.mark.parametrize("block_m", [0, -5, math.nan, math.inf])
     def test_of_blocks_without_extent(self, block_m: float) -> None:
         with pytest.raises(ValueError, match="block"):

@@ -19,10 +19,9 @@ from planner.risk import (
     risk_statistics,
     to_levels,
 )
-from planner.types import FloatArray, GridSpec, SweepFrame
+from planner.types import EVERYWHERE, FloatArray, GridSpec, SweepFrame
 
 GRID = GridSpec(SweepFrame(0, 0, 0), 5, columns=4, rows=3)
-EVERYWHERE = (slice(None), slice(None))
 
 P_DETECT = st.sampled_from([0.0, 1e-4, 0.005, 0.999]) | st.floats(0, 0.999)
 looks = st.lists(arrays(np.float64, GRID.shape, elements=P_DETECT), min_size=1, max_size=6)
