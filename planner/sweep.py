@@ -9,7 +9,7 @@ from functools import lru_cache
 from itertools import pairwise
 from typing import NamedTuple
 
-from planner.dubins import Pose
+from planner.dubins import TIE_M, Pose
 from planner.footprints.footprint import Footprint
 from planner.keep_out import NOWHERE, KeepOut
 from planner.types import Point, Strip, SweepFrame, Track
@@ -131,13 +131,13 @@ def sweeps_by(
 def shortest_sweep(
     sweeps: Sequence[Sweep], pose: Pose, turn_radius_m: float, keep_out: KeepOut = NOWHERE
 ) -> tuple[Sweep, float]:
-    """The sweep that is shortest with the way there from `pose`, of equals the first, and the length of that way in
-    metres. Raises NoSweepError where there is none, or no way there stays out."""
+    """The sweep that is shortest with the way there from `pose`, of those equally long, to within TIE_M, the first, and
+    the length of that way in metres. Raises NoSweepError where there is none, or no way there stays out."""
     best, best_m = None, math.inf
     for sweep in sweeps:
         way = shortest_way(pose, sweep.entry, turn_radius_m, keep_out)
         way_m = math.inf if way is None else way_length_m(way)
-        if way_m + sweep.length_m < best_m - LENGTH_TOLERANCE_M:
+        if way_m + sweep.length_m < best_m - TIE_M:
             best, best_m = sweep, way_m + sweep.length_m
     if best is None:
         raise NoSweepError("there is no sweep to choose from")

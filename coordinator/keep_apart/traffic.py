@@ -144,7 +144,7 @@ class Traffic:
         known = self._surveys.get(name)
         # One that should have sailed its tracks, or has none yet, is where it was heard last.
         is_past = known is not None and known[1] != vehicle.heard_ms and now_s >= known[2].arrives_s
-        if known is None or known[0] != told or is_past or _is_off(vehicle, known[2]):
+        if known is None or known[0] != told or is_past or _is_carried_off(vehicle, known[2]):
             laid = survey_course(vehicle.entry, state, plan, vehicle.heard_ms / 1000, self._keep_out, vehicle.flows)
             known = self._surveys[name] = told, vehicle.heard_ms, laid
         return known[2]
@@ -160,11 +160,16 @@ class Traffic:
             sweep = known.sweep if known and entered else self._sweep_from(pose, vehicle, strip)
             laid = self._over(vehicle, sweep.passes, entered=entered)
             known = self._sweeps[entry.vehicle] = _Sweeping(strip, stage, sweep, laid)
-        elif stage and _is_off(vehicle, known.course):
-            passes = _left_of(known.sweep.passes, state) if stage == 2 else known.sweep.passes
+        elif stage == 1 and _is_off(vehicle, known.course):
+            # The end of the strip to which it is nearer by now is that to which it goes.
+            sweep = self._sweep_from(pose_of(state), vehicle, strip)
+            laid = self._over(vehicle, sweep.passes, entered=False)
+            known = self._sweeps[entry.vehicle] = replace(known, sweep=sweep, course=laid)
+        elif stage == 2 and _is_carried_off(vehicle, known.course):
+            passes = _left_of(known.sweep.passes, state)
             if passes:  # else it turns, and is on the next before long
-                laid = self._over(vehicle, passes, entered=stage == 2)
-                known = self._sweeps[entry.vehicle] = replace(known, course=laid)
+                known = replace(known, course=self._over(vehicle, passes, entered=True))
+                self._sweeps[entry.vehicle] = known
         if stage == 2:
             self._entered[entry.vehicle] = known.sweep
         return known.course
@@ -260,11 +265,17 @@ class Traffic:
 
 
 def _is_off(vehicle: KnownVehicle, laid: Course) -> bool:
-    """Whether a vehicle was heard somewhere else than its course leads, in a current of which not all is known."""
-    state, heard_s = vehicle.state, vehicle.heard_ms / 1000
-    if state is None or vehicle.sailing.is_known or heard_s <= laid.start_s:
+    """Whether a vehicle was heard somewhere else than its course leads. In a current that is known it never is: by
+    modem places are reckoned without one."""
+    sailing, state, heard_s = vehicle.sailing, vehicle.state, vehicle.heard_ms / 1000
+    if state is None or heard_s <= laid.start_s or (sailing.is_known and not sailing.is_in_still_water):
         return False
     return math.dist(laid.at(heard_s)[:2], (state.x_m, state.y_m)) > OFF_COURSE_M
+
+
+def _is_carried_off(vehicle: KnownVehicle, laid: Course) -> bool:
+    """The same in a current of which not all is known."""
+    return not vehicle.sailing.is_known and _is_off(vehicle, laid)
 
 
 def _left_of(passes: Sequence[Pass], state: AgentState) -> Sequence[Pass]:

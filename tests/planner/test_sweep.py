@@ -11,8 +11,9 @@ import pytest
 import shapely
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.optimize import brentq
 
-from planner.dubins import Pose, shortest_path
+from planner.dubins import TIE_M, Pose, shortest_path
 from planner.keep_out import KeepOut
 from planner.sweep import NoSweepError, Sweep, distance_over, legs_over_strip, pass_over, shortest_sweep, sweeps_over
 from planner.types import Strip, Track
@@ -144,6 +145,20 @@ class TestShortestSweep:
         sweep, _ = cheapest(Strip(1, (x_m, y_m), heading_rad, 100, 60), behind, 10, 0, 20)
         assert [leg.across_m for leg in sweep.legs] == [10, 30, 50]
 
+    @pytest.mark.parametrize(("shorter_m", "turned"), [(0.0, False), (0.019, False), (0.021, True)])
+    def test_of_two_ways_that_differ_by_no_more_than_2_cm_takes_the_first(self, shorter_m: float, turned: bool) -> None:
+        # Abeam of a strip's middle; so much shorter is the way to its far end from a little farther north.
+        ways = sweeps_over(Strip(1, (-100, -50), NORTH, 100, 20), 20, 10, 0)
+
+        def gain_m(north_m: float) -> float:
+            to_start_m, to_end_m = (shortest_path(Pose(-30, north_m, WEST), one.entry, 10).length_m for one in ways)
+            return to_start_m - to_end_m
+
+        north_m = 0.0 if not shorter_m else brentq(lambda y_m: gain_m(y_m) - shorter_m, 0.0, 1.0)
+        assert gain_m(north_m) == pytest.approx(shorter_m, abs=1e-9)
+        sweep, _ = shortest_sweep(ways, Pose(-30, north_m, WEST), 10)
+        assert sweep.follows is not turned
+
     @given(strips, poses, st.floats(2, 40), st.sampled_from([0.0, 15.0]))
     def test_is_the_shortest_of_the_four_ways(
         self, strip: Strip, pose: Pose, turn_radius_m: float, run_in_m: float
@@ -162,7 +177,8 @@ class TestShortestSweep:
 
         sweep, distance_m = cheapest(strip, pose, turn_radius_m, run_in_m, 30)
         ordered = list(sweep.legs)
-        assert distance_m == pytest.approx(min(map(flown_m, (legs, legs[::-1], turned, turned[::-1]))))
+        shortest_m = min(map(flown_m, (legs, legs[::-1], turned, turned[::-1])))
+        assert shortest_m - 1e-6 <= distance_m <= shortest_m + TIE_M + 1e-6
         assert distance_m == pytest.approx(flown_m(ordered))
         assert {frozenset((leg.start, leg.end)) for leg in ordered} == {frozenset((leg.start, leg.end)) for leg in legs}
         # Each leg begins where the one before ends, one spacing beside it.

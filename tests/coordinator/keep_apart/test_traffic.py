@@ -368,6 +368,31 @@ class TestWhereItIs:
         assert course.arrives_s > 55  # what is left of it would take 27.5 s
 
 
+class TestTwoWaysAsShortAsEachOther:
+    """Abeam of a strip's middle either of its ends is as near."""
+
+    @staticmethod
+    def heard(traffic: Traffic, one: KnownVehicle, x_m: float, y_m: float, at_s: float) -> Course:
+        one.state, one.heard_ms = AgentState(Mode.TRANSIT, SERVED.number, 1, 0, x_m, y_m, NORTH), round(at_s * 1000)
+        course = traffic.course(one, SERVED, at_s)
+        assert course is not None
+        return course
+
+    def test_who_took_the_other_is_expected_on_it_once_it_is_heard_there(self) -> None:
+        traffic, one, run_outs_end_m = Traffic(), helper(), (15, 125)
+        one.state, one.heard_ms = AgentState(Mode.TRANSIT, SERVED.number, 1, 0, -100, 70, 1.5 * math.pi), 0
+        first = traffic.course(one, SERVED, 0)
+        assert first is not None
+        ends = [first.at(first.arrives_s)[1]]
+        here = first.at(20)
+        assert self.heard(traffic, one, here.x_m, here.y_m, 20) is first
+        other_y_m = 140 - here.y_m
+        anew = self.heard(traffic, one, here.x_m, other_y_m, 25)
+        assert anew.start_s == 25
+        ends.append(anew.at(anew.arrives_s)[1])
+        assert sorted(ends) == pytest.approx(run_outs_end_m)
+
+
 class TestErrands:
     @pytest.mark.parametrize(("heard_ms", "is_sent"), [(39_990, True), (40_000, False)])
     def test_who_is_heard_when_it_should_be_there_rests_where_it_is(self, heard_ms: int, is_sent: bool) -> None:
@@ -496,8 +521,9 @@ class TestInATide:
         # By modem places are reckoned without a current.
         traffic, one = Traffic(), helper()
         one = replace(one, entry=replace(one.entry, drift_mps=drift_mps, set_rad=NORTH))
-        self.heard(traffic, one, Mode.TRANSIT, 0, 0)
-        entered = self.heard(traffic, one, Mode.REVISIT, 20, 10)
+        set_out = self.heard(traffic, one, Mode.TRANSIT, -100, 0)
+        assert (self.heard(traffic, one, Mode.TRANSIT, -50, 10) is set_out) == (drift_mps > 0)
+        entered = self.heard(traffic, one, Mode.REVISIT, 20, 15)
         assert self.heard(traffic, one, Mode.REVISIT, 70, 20) is entered
 
     def test_a_primary_on_its_track_is_where_it_says_and_else_where_its_end_lets_expect(self) -> None:
