@@ -110,7 +110,7 @@ class Traffic:
         pose, radius_m = self._here(vehicle, now_s, strip), vehicle.entry.turn_radius_m
         run_out = self._run_out(vehicle, pose)
         end = run_out.pose_at(run_out.length_m)
-        there = _arrival(end, place)
+        there = _arrival(pose, place)
         way = shortest_way(end, there, radius_m, self._keep_out)
         return way is not None and self._keep_out.circling(there, radius_m) is not None
 
@@ -219,7 +219,7 @@ class Traffic:
         """From a pose at a time to a place, what is left of a run-out first."""
         radius_m, run_out = vehicle.entry.turn_radius_m, self._run_out(vehicle, pose)
         end = run_out.pose_at(run_out.length_m)
-        way = way_or_direct(end, _arrival(end, place), radius_m, self._keep_out)
+        way = way_or_direct(end, _arrival(pose, place), radius_m, self._keep_out)
         return course(pose, start_s, vehicle.sailing, radius_m, [run_out, *way], self._keep_out)
 
     def _rest(self, vehicle: KnownVehicle) -> Course:
@@ -288,5 +288,5 @@ def _left_of(passes: Sequence[Pass], state: AgentState) -> Sequence[Pass]:
 
 
 def _arrival(pose: Pose, place: Point) -> Pose:
-    """How a vehicle that is sent to a place comes there: the way it lies."""
+    """How a vehicle that is sent to a place comes there: the way it lies from where it is told, before any run-out."""
     return Pose(*place, math.atan2(place[0] - pose.x_m, place[1] - pose.y_m) % (2 * math.pi))

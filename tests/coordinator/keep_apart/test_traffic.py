@@ -163,6 +163,15 @@ def test_a_helper_comes_to_where_it_is_to_wait_the_way_that_it_lies(x_m: float, 
     assert math.degrees(arrives.heading_rad) == pytest.approx(bearing_deg, abs=0.01)
 
 
+def test_that_is_as_it_lies_from_where_it_is_told_even_if_a_run_out_comes_first() -> None:
+    traffic, one = Traffic(), helper()
+    traffic.course(at(one, Mode.TRANSIT, 0, 7), SERVED, 0.0)
+    traffic.course(at(one, Mode.REVISIT, 20, 7), SERVED, 0.0)
+    course = traffic.aside(at(one, Mode.IDLE, 120), None, (60.0, 120.0), 0.0)
+    assert course.at(2.0) == pytest.approx((0, 124, NORTH))  # of 5 m
+    assert course.at(course.arrives_s) == pytest.approx((60, 120, math.pi / 2), abs=1e-6)
+
+
 def test_who_is_on_its_way_home_is_expected_there_and_whose_battery_is_empty_where_it_lies() -> None:
     # From 120 m north of its home, headed away from it.
     for mode, then_m in ((Mode.RETURNING, 0), (Mode.EMPTY, 120)):
