@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from random import Random
 from typing import Any
@@ -68,10 +69,13 @@ def draw_fleet(number: int) -> Scenario:
     if rng.random() < 0.15:  # for less than its survey, perhaps
         vehicles[rng.choice(list(vehicles)[:primaries])]["endurance_s"] = _m(rng.uniform(0.2, 1) * _LONGEST_S)
     drawn["area"] |= _zones(number, drawn["area"], width_m, height_m)
-    try:
-        return _built(drawn)
-    except UserError:  # a hole or a zone, seldom, cuts a primary's share in two, or lies where somebody starts
-        return _built(drawn | {"area": drawn["area"] | {"holes_m": [], "keep_out_m": []}})
+    # A hole or a zone, seldom, cuts a primary's share in two, or lies where somebody starts; so may a notch.
+    simpler = drawn["area"] | {"holes_m": [], "keep_out_m": []}
+    rectangle = _rounded([[0, 0], [width_m, 0], [width_m, height_m], [0, height_m]])
+    for area in (drawn["area"], simpler):
+        with contextlib.suppress(UserError):
+            return _built(drawn | {"area": area})
+    return _built(drawn | {"area": simpler | {"polygon_m": rectangle}})
 
 
 def _built(drawn: dict[str, Any]) -> Scenario:

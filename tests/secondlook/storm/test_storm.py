@@ -65,6 +65,12 @@ def test_a_fleet_with_a_hole_that_cuts_a_share_in_two_is_drawn_without_it() -> N
     assert storm_of(None, 302000039).scenario.area.holes_m == ()
 
 
+def test_one_whose_notch_cuts_a_share_in_two_is_drawn_without_that() -> None:
+    scenario = storm_of(None, 88681).scenario
+    assert len(scenario.area.polygon_m) == 4
+    assert len(scenario.survey_vehicles) == 3
+
+
 def test_one_fleet_in_five_talks_by_modems_with_troubles_of_their_own(drawn_storms: list[TroublePlan]) -> None:
     plans = [plan for plan in drawn_storms if plan.scenario.link is not None]
     assert 40 <= len(plans) <= 80  # a fifth of 300
