@@ -41,6 +41,7 @@ GIVES_BACK_S = 50.0
 """So long before it would come too close a helper gives its strip back: until then the other's plan may change. So
 long before it begins to sweep, the whole sweep must be clear."""
 TOLD_AGAIN_S = 10.0
+"""A helper is told again so much later at the earliest, but for one in its way that does something else since then."""
 ASIDE_RAD = tuple(number * math.pi / 4 for number in range(8) if number != 4)
 """Where places to stand aside lie off the bow, to starboard: dead astern a turn to either side is as short, and nobody
 can tell which the vehicle takes."""
@@ -90,6 +91,8 @@ class RightOfWay:
         self._due_s: dict[tuple[str, str], float] = {}
         self._sent_s: dict[str, float] = {}
         self._told_s: dict[str, float] = {}
+        self._news: set[tuple[str, str]] = set()
+        """Who was told something, and whose doings are others since then."""
         self._to_sweep: dict[str, float] = {}
         """When a helper on its way begins to sweep, until that was checked."""
         self._complained_of: set[tuple[str, str]] = set()
@@ -112,6 +115,7 @@ class RightOfWay:
     def changed(self, name: str) -> None:
         """What a vehicle does is another now: to be checked soon."""
         self._due_s = {pair: due_s for pair, due_s in self._due_s.items() if name not in pair}
+        self._news.update((told, name) for told in self._told_s)
         self.check_s = 0.0
 
     def make_room(self, departures: Departures, fleet: Sequence[Underway]) -> list[Instruction]:
@@ -191,7 +195,8 @@ class RightOfWay:
         fleet: Sequence[Underway],
         now_s: float,
     ) -> Instruction | None:
-        if now_s - self._told_s.get(one.name, -math.inf) < TOLD_AGAIN_S:
+        is_news = any((one.name, other.name) in self._news for _, other in approaches)
+        if not is_news and now_s - self._told_s.get(one.name, -math.inf) < TOLD_AGAIN_S:
             return None
         if one.strip is not None and one.vehicle.state is not None and one.vehicle.state.works_on != one.strip.number:
             return None  # its answer is under way
@@ -200,16 +205,20 @@ class RightOfWay:
         if one.strip is not None and self._is_clear(
             self._traffic.holding(one.vehicle, one.strip, now_s), courses, now_s, STANDS_ASIDE_S
         ):
-            self._told_s[one.name] = now_s
+            self._note_told(one.name, now_s)
             return Instruction(one.name, one.strip, None)
         place = self._place_aside(one, courses, now_s)
         if place is None:
             for approach, other in approaches:
                 self._complain(one, other, approach)
             return None
-        self._told_s[one.name] = now_s
+        self._note_told(one.name, now_s)
         self._traffic.sent_aside(one.vehicle, one.strip, place, now_s)
         return Instruction(one.name, one.strip, place)
+
+    def _note_told(self, name: str, now_s: float) -> None:
+        self._told_s[name] = now_s
+        self._news = {pair for pair in self._news if pair[0] != name}
 
     def _place_aside(self, one: Underway, courses: list[Course], now_s: float) -> Point | None:
         """The nearest place in the area at which it can wait; None where there is none."""

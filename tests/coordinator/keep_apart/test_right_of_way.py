@@ -594,6 +594,21 @@ class TestWhatIsTold:
             right.changed("helper")
             assert len(right.check(fleet, now_s)) == times
 
+    def test_or_sooner_once_where_who_comes_into_its_way_does_something_else_since_then(self) -> None:
+        fleet = [Underway(primary(0), None), Underway(known("helper", Role.REVISIT, Mode.IDLE, 3, 90), None)]
+        right = right_of_way()
+        right.changed("primary")  # before it is told anything
+        (told,) = right.check(fleet, 0.0)
+        assert told.place is not None
+        fleet.append(lying(told.place[0] + 20, told.place[1]))
+        for changed, now_s, times in (("helper", 1.0, 0), ("primary", 2.0, 0), (fleet[-1].name, 3.0, 1)):
+            right.changed(changed)
+            again = right.check(fleet, now_s)
+            assert len(again) == times
+        assert again[0].place is not None
+        fleet[-1] = lying(again[0].place[0] + 20, again[0].place[1])
+        assert right.check(fleet, 4.0) == []
+
     def test_where_it_has_nowhere_to_go_that_is_said_once_of_each_two(self, caplog: pytest.LogCaptureFixture) -> None:
         caplog.set_level("DEBUG", "secondlook.coordinator")
         right = RightOfWay(15, lambda place: False)
