@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coordinator.allocate.situation import Helper, OpenStrip
-from planner.dubins import Pose
+from planner.dubins import TIE_M, Pose
 from planner.keep_out import NOWHERE, KeepOut
 from planner.rounding import rounded
 from planner.sweep import NoSweepError, Sweep, shortest_sweep, sweeps_over
@@ -128,10 +128,16 @@ class StripWays:
     def shortest_from(self, poses: FloatArray) -> tuple[FloatArray, NDArray[np.intp]]:
         """Of each strip the way that is shortest from poses, shape (n, 3), as an agent flies it: how long it is until
         the sonar goes on, and which way that is, both of shape (n, strips)."""
-        to_begin_s = self.to_begin_s(poses)
-        # To the microsecond: of equals the first.
-        ways = (to_begin_s + self.sonar_on_s).round(6).argmin(axis=2)
-        return np.take_along_axis(to_begin_s, ways[:, :, np.newaxis], axis=2)[:, :, 0], ways
+        to_begin_s, tie_s = self.to_begin_s(poses), TIE_M / self._helper.speed_mps
+        shortest_s, begins_s = to_begin_s[:, :, 0] + self.sonar_on_s[:, 0], to_begin_s[:, :, 0].copy()
+        ways = np.zeros(begins_s.shape, dtype=np.intp)
+        for way in range(1, to_begin_s.shape[2]):  # of those equally long the first, as of `shortest_sweep`
+            its_s = to_begin_s[:, :, way] + self.sonar_on_s[:, way]
+            is_shorter = its_s < shortest_s - tie_s
+            np.copyto(shortest_s, its_s, where=is_shorter)
+            np.copyto(begins_s, to_begin_s[:, :, way], where=is_shorter)
+            ways[is_shorter] = way
+        return begins_s, ways
 
 
 class StripTable:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -41,13 +42,27 @@ def test_of_all_ways_the_shortest_is_the_one_that_is_expected(told: Situation) -
     for one in told.helpers:
         table = StripTable(told.strips, one)
         poses = np.array([one.free_at, Pose(50, -20, 2.0)])
-        to_begin_s = table.to_begin_s(poses)
-        assert to_begin_s.shape == (2, *table.sonar_on_s.shape)
+        assert table.to_begin_s(poses).shape == (2, *table.sonar_on_s.shape)
+        to_begin_s, ways = table.ways.shortest_from(poses)
         for row, pose in enumerate(poses.tolist()):
             there = replace(one, free_at=Pose(*pose), free_s=0.0)
             for place, job in enumerate(told.strips):
-                ends_s = to_begin_s[row, place] + table.sonar_on_s[place]
-                assert ends_s.min() == pytest.approx(expected_service(job, there).ends_s)
+                served, way = expected_service(job, there), ways[row, place]
+                assert to_begin_s[row, place] + table.sonar_on_s[place, way] == pytest.approx(served.ends_s)
+                assert table.leave[place, way] == pytest.approx(served.free_at)
+
+
+def test_of_ways_that_differ_by_less_than_2_cm_the_first_is_expected() -> None:
+    # Begun at either end it is seen after 578 s, to 1.9 cm.
+    one = helper("a", 188, 340, math.pi, speed_mps=1.0, swath_m=30)
+    job = open_strip(strip(2, 0, 208, 243, 1.0))
+    table = StripTable([job], one)
+    to_begin_s, ((way,),) = table.ways.shortest_from(np.array([one.free_at]))
+    ends_s = table.to_begin_s(np.array([one.free_at]))[0, 0] + table.sonar_on_s[0]
+    assert 0.018 < ends_s[way] - ends_s.min() < 0.02
+    assert way < ends_s.argmin()
+    assert to_begin_s[0, 0] + table.sonar_on_s[0, way] == ends_s[way]
+    assert table.leave[0, way] == pytest.approx(expected_service(job, one).free_at)
 
 
 def test_strips_of_one_leg_and_of_two_are_each_as_by_itself() -> None:
