@@ -48,6 +48,11 @@ class Sails:
             return still_m
         return np.interp(sails_for_s, *self.knots) + np.maximum(still_m - self.still_mps * self.sails_s, 0.0)
 
+    @property
+    def fastest_mps(self) -> float:
+        """No faster does it come anywhere; infinite where that is not known."""
+        return self.still_mps if self.knots is None else math.inf
+
     def pose_at(self, time_s: float) -> Pose:
         """Where it is."""
         left_m = float(self.way_m(np.array(time_s - self.start_s)))
@@ -215,6 +220,7 @@ def survey_run_out_left_m(entry: RosterVehicle, behind: Sequence[PlannedTrack], 
     return run_out_left_m(pass_of(behind[-1], entry).end, pose, entry.run_in_m) if behind else 0.0
 
 
+ROUNDING_M = 0.01
 NO_NEARER_M = 1.0
 """Vehicles that begin too close may part; they come no nearer by more than this."""
 SOON_S = 10.0
@@ -243,6 +249,10 @@ def too_close(
     if last - first < 1:
         return None
     (x_m, y_m), (its_x_m, its_y_m) = one.at(from_s)[:2], other.at(from_s)[:2]
+    lasts_s = (last - 1) * STEP_S - from_s
+    closing_m = lasts_s * (one.sails.fastest_mps + other.sails.fastest_mps)
+    if math.hypot(x_m - its_x_m, y_m - its_y_m) - closing_m > least_m + ROUNDING_M:
+        return None
     apart = np.empty((1 + last - first, 2))
     apart[0] = x_m - its_x_m, y_m - its_y_m
     np.subtract(

@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Sequence, Set
 from dataclasses import dataclass
 from itertools import product
+
+import numpy as np
 
 from coordinator.allocate.situation import Helper, OpenStrip
 from coordinator.keep_apart.courses import STEP_S, Approach, Course, too_close
@@ -19,7 +21,7 @@ from coordinator.keep_apart.traffic import Traffic
 from coordinator.vehicles import KnownVehicle
 from planner.keep_out import NOWHERE, KeepOut
 from planner.sweep import Sweep
-from planner.types import Point, Strip
+from planner.types import BoolArray, FloatArray, Point, Strip
 
 log = logging.getLogger("secondlook.coordinator")
 
@@ -88,11 +90,16 @@ class RightOfWay:
         """When to check next."""
         self._is_inside = is_inside
         self._traffic = Traffic(keep_out)
-        self._due_s: dict[tuple[str, str], float] = {}
+        self._places: dict[str, int] = {}
+        """Of vehicles in what follows."""
+        self._due_s: FloatArray = np.zeros((0, 0))
+        """When to check next whether one, by row, comes too close to another, by column."""
         self._sent_s: dict[str, float] = {}
-        self._told_s: dict[str, float] = {}
-        self._news: set[tuple[str, str]] = set()
-        """Who was told something, and whose doings are others since then."""
+        self._changes = 0
+        self._changed: dict[str, int] = {}
+        """The how manieth change was the last one of what a vehicle does."""
+        self._told: dict[str, tuple[float, int]] = {}
+        """When a helper was told something last, and after how many changes."""
         self._to_sweep: dict[str, float] = {}
         """When a helper on its way begins to sweep, until that was checked."""
         self._complained_of: set[tuple[str, str]] = set()
@@ -114,8 +121,10 @@ class RightOfWay:
 
     def changed(self, name: str) -> None:
         """What a vehicle does is another now: to be checked soon."""
-        self._due_s = {pair: due_s for pair, due_s in self._due_s.items() if name not in pair}
-        self._news.update((told, name) for told in self._told_s)
+        self._changes += 1
+        self._changed[name] = self._changes
+        place = self._place(name)
+        self._due_s[place, :] = self._due_s[:, place] = 0.0
         self.check_s = 0.0
 
     def make_room(self, departures: Departures, fleet: Sequence[Underway]) -> list[Instruction]:
@@ -129,31 +138,52 @@ class RightOfWay:
 
     def check(self, fleet: Sequence[Underway], now_s: float) -> list[Instruction]:
         """Whom to tell what, so that nobody comes too close to one that goes first."""
-        instructions = []
         ranked = sorted((one for one in fleet if not one.vehicle.lost), key=self._rank)
-        next_s = now_s + CLEAR_AHEAD_S
-        for place, one in enumerate(ranked):
-            if not one.gives_way:
-                continue
-            approaches = []
-            begins = self._to_sweep.get(one.name, math.inf) - GIVES_BACK_S <= now_s
-            for other in ranked[:place]:
-                pair = (one.name, other.name)
-                if self._due_s.get(pair, 0.0) <= now_s or begins:
-                    self._due_s[pair] = self._next_check_s(one, other, now_s)
-                    if self._due_s[pair] <= now_s or begins:
-                        self._due_s[pair] = max(self._due_s[pair], now_s + 1.0)
-                        approach = self._approach(one, other, now_s, begins=begins)
-                        if approach is not None:
-                            approaches.append((approach, other))
-                next_s = min(next_s, self._due_s[pair])
-            if begins:
-                del self._to_sweep[one.name]
-            next_s = min(next_s, self._to_sweep.get(one.name, math.inf) - GIVES_BACK_S)
+        begins = {name for name, begins_s in self._to_sweep.items() if begins_s - GIVES_BACK_S <= now_s}
+        is_pair, is_due = self._pairs(ranked, begins, now_s)
+        instructions = []
+        for place in np.logical_or.reduce(is_due, axis=1).nonzero()[0].tolist():
+            one, approaches = ranked[place], []
+            for other in (ranked[before] for before in is_due[place].nonzero()[0].tolist()):
+                due_s = self._next_check_s(one, other, now_s)
+                if due_s <= now_s or one.name in begins:
+                    due_s = max(due_s, now_s + 1.0)
+                    approach = self._approach(one, other, now_s, begins=one.name in begins)
+                    if approach is not None:
+                        approaches.append((approach, other))
+                self._due_s[self._place(one.name), self._place(other.name)] = due_s
             instruction = self._instruction(one, approaches, [], fleet, now_s) if approaches else None
             instructions += [] if instruction is None else [instruction]
-        self.check_s = next_s
+        gives_way = {one.name for one in ranked if one.gives_way}
+        for name in begins & gives_way:
+            del self._to_sweep[name]
+        to_sweep_s = (begins_s for name, begins_s in self._to_sweep.items() if name in gives_way)
+        next_s = min(to_sweep_s, default=math.inf) - GIVES_BACK_S
+        due_s = self._due_of(ranked).min(initial=math.inf, where=is_pair)
+        self.check_s = min(now_s + CLEAR_AHEAD_S, next_s, float(due_s))
         return instructions
+
+    def _pairs(self, ranked: Sequence[Underway], begins: Set[str], now_s: float) -> tuple[BoolArray, BoolArray]:
+        """Of which pairs the one gives way to the other, and which of these are to be checked now; shape (vehicles,
+        vehicles), by their places. `begins`: who is about to begin to sweep."""
+        gives_way = np.array([one.gives_way for one in ranked], dtype=np.bool_)
+        is_pair = np.tri(len(ranked), k=-1, dtype=np.bool_) & gives_way[:, np.newaxis]
+        is_begun = np.array([one.name in begins for one in ranked], dtype=np.bool_)
+        return is_pair, is_pair & ((self._due_of(ranked) <= now_s) | is_begun[:, np.newaxis])
+
+    def _due_of(self, ranked: Sequence[Underway]) -> FloatArray:
+        """When pairs of these are to be checked next, by their places."""
+        places = np.array([self._place(one.name) for one in ranked], dtype=np.intp)
+        due_s: FloatArray = self._due_s[np.ix_(places, places)]
+        return due_s
+
+    def _place(self, name: str) -> int:
+        """A vehicle's row and column."""
+        if name not in self._places:
+            self._places[name] = len(self._places)
+            if len(self._places) > len(self._due_s):
+                self._due_s = np.pad(self._due_s, (0, max(4, len(self._due_s))))
+        return self._places[name]
 
     def _rank(self, one: Underway) -> tuple[int, float, str]:
         """The lower goes first."""
@@ -195,8 +225,9 @@ class RightOfWay:
         fleet: Sequence[Underway],
         now_s: float,
     ) -> Instruction | None:
-        is_news = any((one.name, other.name) in self._news for _, other in approaches)
-        if not is_news and now_s - self._told_s.get(one.name, -math.inf) < TOLD_AGAIN_S:
+        told_s, changes = self._told.get(one.name, (-math.inf, 0))
+        is_news = any(self._changed.get(other.name, 0) > changes for _, other in approaches)
+        if not is_news and now_s - told_s < TOLD_AGAIN_S:
             return None
         if one.strip is not None and one.vehicle.state is not None and one.vehicle.state.works_on != one.strip.number:
             return None  # its answer is under way
@@ -205,20 +236,16 @@ class RightOfWay:
         if one.strip is not None and self._is_clear(
             self._traffic.holding(one.vehicle, one.strip, now_s), courses, now_s, STANDS_ASIDE_S
         ):
-            self._note_told(one.name, now_s)
+            self._told[one.name] = now_s, self._changes
             return Instruction(one.name, one.strip, None)
         place = self._place_aside(one, courses, now_s)
         if place is None:
             for approach, other in approaches:
                 self._complain(one, other, approach)
             return None
-        self._note_told(one.name, now_s)
+        self._told[one.name] = now_s, self._changes
         self._traffic.sent_aside(one.vehicle, one.strip, place, now_s)
         return Instruction(one.name, one.strip, place)
-
-    def _note_told(self, name: str, now_s: float) -> None:
-        self._told_s[name] = now_s
-        self._news = {pair for pair in self._news if pair[0] != name}
 
     def _place_aside(self, one: Underway, courses: list[Course], now_s: float) -> Point | None:
         """The nearest place in the area at which it can wait; None where there is none."""

@@ -370,6 +370,19 @@ class TestTooClose:
         assert too_close(north, south, 20, 0, 90) is None
         assert too_close(north, south, 20, 120, 600) is None
 
+    @pytest.mark.parametrize(
+        ("sailing", "begin_m", "last_m"),
+        [(Sailing(2.0), 400, 16), (Sailing(2.0, drift_mps=1.0, set_rad=NORTH), 492, 12)],
+    )
+    def test_they_are_found_as_soon_as_they_can_be(self, sailing: Sailing, begin_m: float, last_m: float) -> None:
+        # They close at 4 m/s, with the current at 5 m/s; `last_m` is ahead of each after 96 s, and 5 m beside it.
+        north = course(Pose(0, 0, NORTH), 0, sailing, 10, [straight(Pose(0, 0, NORTH), 2000, 10)])
+        south = ahead(5, begin_m, SOUTH, 2)
+        assert too_close(north, south, 20, 0, 92) is None
+        found = too_close(north, south, 20, 0, 94)
+        assert found is not None
+        assert [found.time_s, found.distance_m] == pytest.approx([94, math.hypot(last_m, 5)])
+
     def test_two_that_begin_near_may_part(self) -> None:
         assert too_close(ahead(0, 0, NORTH, 2), ahead(10, 0, SOUTH, 2), 20, 0, 300) is None
 

@@ -623,6 +623,18 @@ class TestWhatIsTold:
             for name in ("helper", "second")
         ]
 
+    def test_in_a_large_fleet_each_two_are_looked_at_by_themselves(self) -> None:
+        far = [Underway(known(f"far-{n}", Role.REVISIT, Mode.IDLE, 0, 5000 + 400 * n), None) for n in range(12)]
+        near = Underway(known("near", Role.REVISIT, Mode.IDLE, 3, 90), None)
+        right = right_of_way()
+        assert right.check([Underway(primary(0, 4000), None), *far, near], 0.0) == []
+        fleet = [*far, near, Underway(primary(0), None)]
+        assert right.check(fleet, 1.0) == []  # not to be looked at yet
+        right.changed("far-3")
+        assert right.check(fleet, 2.0) == []
+        right.changed("primary")
+        assert [told.name for told in right.check(fleet, 3.0)] == ["near"]
+
 
 class TestWhenItIsChecked:
     def test_first_at_once(self) -> None:
