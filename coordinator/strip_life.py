@@ -91,7 +91,8 @@ class StripLife:
         ends_ms = round(expected.ends_s * 1000)
         due_ms = ends_ms + round(LATE_SHARE * (ends_ms - now_ms)) + self._late_ms
         levels = self._fleet.levels(name, record.window)
-        vehicle.offers[number] = Offer(record.strip, record.cut, expected, due_ms, levels, now_ms)
+        offer = Offer(record.strip, record.cut, expected, due_ms, levels, now_ms)
+        vehicle.note_offer(offer, self._answer_within_ms)
         if as_next:
             vehicle.agreed_next = 0
             self._move(record, StripState.NEXT, now_ms, f"offered to {name} as its next", name)
@@ -148,6 +149,8 @@ class StripLife:
             elif status.state is not TaskState.REFUSED and record is not None and record.vehicle == name:
                 self._await_no_more(record, now_ms)
             return
+        if status.state is TaskState.REFUSED and vehicle.refuses_older(status.strip):
+            return  # what it says to the newest offer is to come
         if status.state is TaskState.REFUSED:
             self._sectors.assign_by(now_ms, record.window)
         else:
@@ -299,7 +302,7 @@ class StripLife:
             if other.state is not StripState.OFFERED and self._seen_share(other) >= COVERED_SHARE:
                 self._move(other, StripState.DONE, now_ms, f"seen by {name}, which is at strip {number}", name)
                 self._sectors.cut_by(now_ms, [other.window])
-            elif self._may_be_done(other, vehicle):
+            elif self._may_be_done(other, vehicle, now_ms):
                 self._await_looks(
                     other, name, now_ms, f"left by {name}, which is at strip {number}; its looks are to come"
                 )
@@ -318,7 +321,7 @@ class StripLife:
                 if self._seen_share(record) >= COVERED_SHARE:
                     vehicle.failures = 0
                     self._move(record, StripState.DONE, now_ms, f"seen by {name}, whose word on it was lost", name)
-                elif self._may_be_done(record, vehicle):
+                elif self._may_be_done(record, vehicle, now_ms):
                     self._await_looks(record, name, now_ms, f"left by {name}, which has no work; its looks are to come")
                 else:
                     vehicle.note_failure()
@@ -343,10 +346,12 @@ class StripLife:
         vehicle.failures = 0
         self._sectors.learn(record.window, record.vehicle, offer.levels_before, vehicle.entry.p_detect)
 
-    def _may_be_done(self, record: StripRecord, vehicle: KnownVehicle) -> bool:
+    def _may_be_done(self, record: StripRecord, vehicle: KnownVehicle, now_ms: int) -> bool:
         """Whether a vehicle that has left a strip may have said that it is done, and its looks be on their way."""
-        is_under_way = record.state is StripState.UNDER_WAY and vehicle.asked_back != record.strip.number
-        return self._looks_within_ms > 0 and is_under_way
+        offer = vehicle.offers.get(record.strip.number)
+        is_late = record.state is StripState.ACCEPTED and offer is not None and offer.service.ends_s * 1000 <= now_ms
+        is_at_it = (record.state is StripState.UNDER_WAY or is_late) and vehicle.asked_back != record.strip.number
+        return self._looks_within_ms > 0 and is_at_it
 
     def _was_served(self, record: StripRecord, vehicle: KnownVehicle) -> bool:
         """Whether a strip that is open again is done by the late word of a vehicle that had it, as its looks may come

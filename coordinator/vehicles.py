@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from comms.said.announcement import Role, RosterVehicle
 from comms.said.codec import Header
@@ -117,7 +117,11 @@ MOST_UNANSWERED = 10  # offers in a row, of which under bad water some are lost
 @dataclass(frozen=True)
 class Offer:
     """A strip as a vehicle was offered it: what it was cut from, how the service is expected to go, until when it is
-    waited for, what the vehicle's own layer told then of the cells that the strip was cut from, and when that was."""
+    waited for, what the vehicle's own layer told then of the cells that the strip was cut from, and when that was.
+
+    `newest`: what the vehicle had told last of the strip by then; `older`: how many offers of it that were made before
+    it may answer yet, so that a refusal may be of one of these.
+    """
 
     strip: Strip
     cut: Cut
@@ -125,6 +129,8 @@ class Offer:
     due_ms: int
     levels_before: LevelArray
     offered_ms: int
+    newest: Order = _NONE_YET
+    older: int = 0
 
 
 @dataclass
@@ -300,6 +306,23 @@ class KnownVehicle:
         if order <= self._task_orders.get(strip, _NONE_YET):
             return False
         self._task_orders[strip] = order
+        return True
+
+    def note_offer(self, offer: Offer, answer_within_ms: int) -> None:
+        """Notes that it is offered a strip. `answer_within_ms`: for so long it may answer one before it."""
+        number = offer.strip.number
+        before, newest = self.offers.get(number), self._task_orders.get(number, _NONE_YET)
+        is_open = before is not None and offer.offered_ms - before.offered_ms < answer_within_ms
+        older = before.older + 1 if before is not None and is_open and newest == before.newest else 0
+        self.offers[number] = replace(offer, newest=newest, older=older)
+
+    def refuses_older(self, number: int) -> bool:
+        """Whether a refusal of a strip may be of an offer that was made before the newest; that is answered then."""
+        offer = self.offers.get(number)
+        if offer is None or not offer.older:
+            return False
+        newest = self._task_orders.get(number, _NONE_YET)
+        self.offers[number] = replace(offer, newest=newest, older=offer.older - 1)
         return True
 
     def has_told_since(self, header: Header, strip: int) -> bool:

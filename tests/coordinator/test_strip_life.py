@@ -848,26 +848,29 @@ class TestWhoIsAtAnother:
         assert lives.due() == [(Item.CUT, 0, 7_000)]
 
     @pytest.mark.parametrize(
-        ("state", "looks_within_ms", "asked_back", "left"),
+        ("state", "looks_within_ms", "asked_back", "at_ms", "left"),
         [
-            (TaskState.UNDER_WAY, 1, 0, DONE),
-            (TaskState.UNDER_WAY, 0, 0, OPEN),
-            (TaskState.UNDER_WAY, 80_000, 1, OPEN),
-            (TaskState.UNDER_WAY, 80_000, 2, DONE),
-            (TaskState.ACCEPTED, 80_000, 0, OPEN),
+            (TaskState.UNDER_WAY, 1, 0, 7_000, DONE),
+            (TaskState.UNDER_WAY, 0, 0, 7_000, OPEN),
+            (TaskState.UNDER_WAY, 80_000, 1, 7_000, OPEN),
+            (TaskState.UNDER_WAY, 80_000, 2, 7_000, DONE),
+            (TaskState.ACCEPTED, 80_000, 0, 199_999, OPEN),
+            (TaskState.ACCEPTED, 80_000, 0, 200_000, DONE),  # that it was under way and is done may both be lost
+            (TaskState.ACCEPTED, 80_000, 1, 200_000, OPEN),
+            (TaskState.ACCEPTED, 0, 0, 200_000, OPEN),
         ],
     )
-    def test_or_its_looks_are_to_come_if_it_was_under_way_and_not_asked_back(
-        self, state: TaskState, looks_within_ms: int, asked_back: int, left: StripState
+    def test_or_its_looks_are_to_come_if_it_was_under_way_or_should_have_done_and_not_asked_back(
+        self, state: TaskState, looks_within_ms: int, asked_back: int, at_ms: int, left: StripState
     ) -> None:
         lives = self.with_both(state, looks_within_ms=looks_within_ms)
         lives.vehicle(HELPER).asked_back = asked_back
-        lives.tell(HELPER, 2, TaskState.ACCEPTED, 7_000)
+        lives.tell(HELPER, 2, TaskState.ACCEPTED, at_ms)
         assert lives.states() == [left, ACCEPTED]
         if left is DONE:
             assert lives.said()[0][0] == f"left by {HELPER}, which is at strip 2; its looks are to come"
-            assert lives.due() == [(Item.CUT, 0, 7_000)]
-            assert 7_000 + looks_within_ms in lives.life.deadlines_ms()
+            assert lives.due() == [(Item.CUT, 0, at_ms)]
+            assert at_ms + looks_within_ms in lives.life.deadlines_ms()
 
     @pytest.mark.parametrize(
         ("name", "looks_within_ms", "moved", "left"),
@@ -990,6 +993,66 @@ class TestWhoWasOfferedItBefore:
         lives.tell(HELPER, 1, TaskState.NEXT, 30_000)
         assert lives.said() == [(HELPER, TaskAction.GIVE_BACK, 1)]
         assert lives.vehicle(HELPER).agreed_next == 0
+
+
+class TestWhoWasOfferedItTwice:
+    """Strip 1 was offered to a helper, which then said that it was at another, and is offered as its next again."""
+
+    def lives(self, *, again_ms: int = 5_000) -> Lives:
+        lives = Lives()
+        lives.offered(HELPER, IN_THE_EAST)
+        self.offer_again(lives, again_ms)
+        return lives
+
+    def offer_again(self, lives: Lives, at_ms: int) -> None:
+        lives.ledger.move(lives.strip(1), OPEN, at_ms, f"{HELPER} is at strip 2")
+        lives.life.offer(1, HELPER, Service(100, 200, Pose(0, 0, 0), 205), at_ms, as_next=True)
+        lives.forget()
+
+    def test_a_refusal_is_of_the_offer_before_and_only_one_more_of_the_newest(self) -> None:
+        lives = self.lives()
+        lives.tell(HELPER, 1, TaskState.REFUSED, 6_000)
+        assert (lives.states(), lives.said(), lives.due()) == ([NEXT], [], [])
+        assert lives.vehicle(HELPER).refused == set()
+        lives.tell(HELPER, 1, TaskState.REFUSED, 7_000)
+        assert lives.states() == [OPEN]
+        assert lives.vehicle(HELPER).refused == {1}
+
+    def test_of_three_offers_two_may_be_refused(self) -> None:
+        lives = self.lives()
+        self.offer_again(lives, 6_000)
+        for at_ms, state in ((7_000, NEXT), (8_000, NEXT), (9_000, OPEN)):
+            lives.tell(HELPER, 1, TaskState.REFUSED, at_ms)
+            assert lives.states() == [state]
+
+    def test_who_answers_only_the_first_of_them_is_waited_for_as_long_as_for_any_answer(self) -> None:
+        lives = self.lives()
+        lives.tell(HELPER, 1, TaskState.REFUSED, 6_000)
+        assert list(lives.life.deadlines_ms()) == [30_000]
+        lives.life.find_overdue([], 30_000)
+        assert lives.said() == [(f"no answer from {HELPER}", OPEN, 1)]
+
+    def test_what_was_refused_before_it_is_offered_again_is_refused_at_once_the_next_time(self) -> None:
+        lives = Lives()
+        lives.offered(HELPER, IN_THE_EAST)
+        lives.tell(HELPER, 1, TaskState.REFUSED, 4_000)
+        lives.life.offer(1, HELPER, Service(100, 200, Pose(0, 0, 0), 205), 5_000, as_next=True)
+        lives.tell(HELPER, 1, TaskState.REFUSED, 6_000)
+        assert lives.states() == [OPEN]
+
+    @pytest.mark.parametrize(("again_ms", "left"), [(24_999, NEXT), (25_000, OPEN)])
+    def test_an_offer_that_nobody_waits_for_any_more_is_none(self, again_ms: int, left: StripState) -> None:
+        lives = self.lives(again_ms=again_ms)
+        lives.tell(HELPER, 1, TaskState.REFUSED, 26_000)
+        assert lives.states() == [left]
+
+    def test_who_refuses_the_first_and_was_offered_it_once_more_has_two_to_answer(self) -> None:
+        lives = self.lives()
+        lives.tell(HELPER, 1, TaskState.REFUSED, 6_000)
+        self.offer_again(lives, 7_000)
+        for at_ms, state in ((8_000, NEXT), (9_000, OPEN)):
+            lives.tell(HELPER, 1, TaskState.REFUSED, at_ms)
+            assert lives.states() == [state]
 
 
 class TestWhoHasNoWork:
