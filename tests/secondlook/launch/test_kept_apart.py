@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -16,9 +17,10 @@ from one_node import received
 from comms.node import Received
 from comms.said.messages import Nav, TaskState, TaskStatus, TruthPose
 from coordinator.allocate.allocators import ALLOCATORS
+from planner.types import FloatArray
 from secondlook.errors import UserError
 from secondlook.launch.run_display import closing_table
-from secondlook.recorded.closest_approach import Closest, ClosestApproaches
+from secondlook.recorded.closest_approach import NEAR_M, Closest, ClosestApproaches
 from secondlook.recorded.whereabouts import Whereabouts
 from secondlook.testing import Fleet, assert_kept_apart, assert_no_strip_lost
 
@@ -106,13 +108,20 @@ class TestMissions:
         )
 
 
-def closest(*said: Received, until_s: float = 0.0, speed_mps: float = 20.0) -> Closest | None:
-    """What becomes of what a and b say, in the order of time; None where they were not under way at one time."""
-    figure, whereabouts = ClosestApproaches({"a": speed_mps, "b": speed_mps}), Whereabouts()
+def approaches(*said: Received, until_s: float = 0.0, speed_mps: float = 20.0) -> list[Closest]:
+    """What becomes of what vehicles of one letter each say, in the order of time."""
+    figure, whereabouts = ClosestApproaches(dict.fromkeys("abcdef", speed_mps)), Whereabouts()
     told = [place for one in said for place in whereabouts.hear(one)]
     for place in [*told, *whereabouts.end(round(until_s * 1000))]:
         figure.hear(place)
-    return figure.found()[0] if figure.found() else None
+    return figure.found()
+
+
+def closest(*said: Received, until_s: float = 0.0, speed_mps: float = 20.0) -> Closest | None:
+    """The same of two; None where they were not under way at one time."""
+    found = approaches(*said, until_s=until_s, speed_mps=speed_mps)
+    assert len(found) <= 1
+    return found[0] if found else None
 
 
 class TestTheFigure:
@@ -165,3 +174,28 @@ class TestTheFigure:
         share = np.linspace(0, 1, 101)[:, np.newaxis, np.newaxis]
         apart_m = np.hypot(*np.moveaxis(apart[:-1] * (1 - share) + apart[1:] * share, -1, 0))
         assert found.closest_m == pytest.approx(apart_m.min(), abs=0.02)
+
+    @given(st.lists(st.lists(st.tuples(*[st.floats(-300, 300)] * 2), min_size=6, max_size=6), min_size=2, max_size=8))
+    def test_of_many_each_one_s_nearest_is_told_and_all_that_came_near(
+        self, turns: list[list[tuple[float, float]]]
+    ) -> None:
+        """Six vehicles, of which four begin near each other, turn each five seconds; against all pairs at all times."""
+        begin = np.array([[0, 0], [300, 0], [0, 400], [900, 300], [4000, 500], [7000, 0]])
+        ways = np.round(np.cumsum(np.repeat(np.array(turns), 5, axis=0), axis=0) + begin, 2)
+        places = dict(zip("abcdef", np.moveaxis(ways, 1, 0), strict=True))
+        said = [nav(name, t_s, *places[name][t_s]) for t_s in range(len(ways)) for name in places]
+        least_m = {(one, other): least_apart_m(places[one] - places[other]) for one, other in combinations(places, 2)}
+        nearest_m = {name: min(apart_m for pair, apart_m in least_m.items() if name in pair) for name in places}
+        found = {one.vehicles: one.closest_m for one in approaches(*said, speed_mps=430.0)}
+        for pair, told_m in found.items():
+            assert told_m == pytest.approx(least_m[pair], abs=1e-6)
+        for pair, apart_m in least_m.items():
+            assert pair in found or apart_m > max(NEAR_M, *(nearest_m[name] for name in pair)) - 1e-6
+
+
+def least_apart_m(apart: FloatArray) -> float:
+    """How near two vehicles came to each other that sail straight between the places where they are so far apart."""
+    by = np.diff(apart, axis=0)
+    square = np.maximum((by**2).sum(axis=1), 1e-12)
+    share = np.clip(-(apart[:-1] * by).sum(axis=1) / square, 0, 1)
+    return float(np.hypot(*(apart[:-1] + share[:, np.newaxis] * by).T).min())
