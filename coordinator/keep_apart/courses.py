@@ -221,6 +221,7 @@ def survey_run_out_left_m(entry: RosterVehicle, behind: Sequence[PlannedTrack], 
 
 
 ROUNDING_M = 0.01
+"""Courses that are said to be too far off to meet are so by more than this: what is summed step by step is rounded."""
 NO_NEARER_M = 1.0
 """Vehicles that begin too close may part; they come no nearer by more than this."""
 SOON_S = 10.0

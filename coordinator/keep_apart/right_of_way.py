@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable, Sequence, Set
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -21,7 +21,7 @@ from coordinator.keep_apart.traffic import Traffic
 from coordinator.vehicles import KnownVehicle
 from planner.keep_out import NOWHERE, KeepOut
 from planner.sweep import Sweep
-from planner.types import BoolArray, FloatArray, Point, Strip
+from planner.types import FloatArray, Point, Strip
 
 log = logging.getLogger("secondlook.coordinator")
 
@@ -140,42 +140,36 @@ class RightOfWay:
         """Whom to tell what, so that nobody comes too close to one that goes first."""
         ranked = sorted((one for one in fleet if not one.vehicle.lost), key=self._rank)
         begins = {name for name, begins_s in self._to_sweep.items() if begins_s - GIVES_BACK_S <= now_s}
-        is_pair, is_due = self._pairs(ranked, begins, now_s)
+        places = np.array([self._place(one.name) for one in ranked], dtype=np.intp)
+        gives_way = np.array([one.gives_way for one in ranked], dtype=np.bool_)
+        is_begun = np.array([one.name in begins for one in ranked], dtype=np.bool_)
+        among = np.ix_(places, places)
+        is_pair = np.tri(len(ranked), k=-1, dtype=np.bool_) & gives_way[:, np.newaxis]  # the one gives way to the other
+        is_due = is_pair & ((self._due_s[among] <= now_s) | is_begun[:, np.newaxis])
         instructions = []
-        for place in np.logical_or.reduce(is_due, axis=1).nonzero()[0].tolist():
-            one, approaches = ranked[place], []
-            for other in (ranked[before] for before in is_due[place].nonzero()[0].tolist()):
+        for rank in np.logical_or.reduce(is_due, axis=1).nonzero()[0].tolist():
+            one, approaches = ranked[rank], []
+            for before in is_due[rank].nonzero()[0].tolist():
+                other = ranked[before]
                 due_s = self._next_check_s(one, other, now_s)
                 if due_s <= now_s or one.name in begins:
                     due_s = max(due_s, now_s + 1.0)
                     approach = self._approach(one, other, now_s, begins=one.name in begins)
                     if approach is not None:
                         approaches.append((approach, other))
-                self._due_s[self._place(one.name), self._place(other.name)] = due_s
+                self._due_s[places[rank], places[before]] = due_s
             instruction = self._instruction(one, approaches, [], fleet, now_s) if approaches else None
             instructions += [] if instruction is None else [instruction]
-        gives_way = {one.name for one in ranked if one.gives_way}
-        for name in begins & gives_way:
-            del self._to_sweep[name]
-        to_sweep_s = (begins_s for name, begins_s in self._to_sweep.items() if name in gives_way)
+        to_sweep_s = []
+        for one in (ranked[rank] for rank in gives_way.nonzero()[0].tolist()):
+            if one.name in begins:
+                del self._to_sweep[one.name]
+            elif one.name in self._to_sweep:
+                to_sweep_s.append(self._to_sweep[one.name])
         next_s = min(to_sweep_s, default=math.inf) - GIVES_BACK_S
-        due_s = self._due_of(ranked).min(initial=math.inf, where=is_pair)
-        self.check_s = min(now_s + CLEAR_AHEAD_S, next_s, float(due_s))
+        next_due_s = self._due_s[among].min(initial=math.inf, where=is_pair)
+        self.check_s = min(now_s + CLEAR_AHEAD_S, next_s, float(next_due_s))
         return instructions
-
-    def _pairs(self, ranked: Sequence[Underway], begins: Set[str], now_s: float) -> tuple[BoolArray, BoolArray]:
-        """Of which pairs the one gives way to the other, and which of these are to be checked now; shape (vehicles,
-        vehicles), by their places. `begins`: who is about to begin to sweep."""
-        gives_way = np.array([one.gives_way for one in ranked], dtype=np.bool_)
-        is_pair = np.tri(len(ranked), k=-1, dtype=np.bool_) & gives_way[:, np.newaxis]
-        is_begun = np.array([one.name in begins for one in ranked], dtype=np.bool_)
-        return is_pair, is_pair & ((self._due_of(ranked) <= now_s) | is_begun[:, np.newaxis])
-
-    def _due_of(self, ranked: Sequence[Underway]) -> FloatArray:
-        """When pairs of these are to be checked next, by their places."""
-        places = np.array([self._place(one.name) for one in ranked], dtype=np.intp)
-        due_s: FloatArray = self._due_s[np.ix_(places, places)]
-        return due_s
 
     def _place(self, name: str) -> int:
         """A vehicle's row and column."""

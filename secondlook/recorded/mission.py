@@ -196,7 +196,8 @@ class Mission(ABC):
 
     @property
     def closest(self) -> list[Closest]:
-        """How near each two vehicles came to each other while both were under way, the nearest first."""
+        """How near vehicles came to each other while both were under way, the nearest first: each pair within 1 km, and
+        of each vehicle its nearest."""
         return self._figures.approaches.found()
 
     @property

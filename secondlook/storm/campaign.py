@@ -12,6 +12,7 @@ from typing import cast
 
 from secondlook.engine.engine import do_all, own_processes
 from secondlook.engine.work_process import Lost
+from secondlook.errors import UserError
 from secondlook.launch.mission import Bus
 from secondlook.scenario import Scenario
 from secondlook.storm.fleets import draw_fleet
@@ -81,13 +82,10 @@ def fly_storms(
     STORM_LIMIT_S, or at which its process dies, something did not hold.
     """
     with own_processes(min(jobs, len(numbers))) as engine:
-        storms = do_all(partial(_fly, scenario, again), numbers, engine, count=len(numbers), limit_s=STORM_LIMIT_S)
+        flies = partial(fly_number, scenario, again)
+        storms = do_all(flies, numbers, engine, count=len(numbers), limit_s=STORM_LIMIT_S)
         for number, flown in storms:
-            outcomes[number] = (
-                Outcome((without_end(flown.why),), digest=None, end_s=0.0, wall_s=0.0)
-                if isinstance(flown, Lost)
-                else flown
-            )
+            outcomes[number] = _unflown(without_end(flown.why)) if isinstance(flown, Lost) else flown
             progress(number, outcomes[number])
 
 
@@ -96,9 +94,17 @@ def without_end(why: str) -> Violation:
     return Violation("ends", 0.0, "run", why)
 
 
-def _fly(scenario: Scenario | None, again: int, number: int) -> Outcome:
+def _unflown(why: Violation) -> Outcome:
+    return Outcome((why,), digest=None, end_s=0.0, wall_s=0.0)
+
+
+def fly_number(scenario: Scenario | None, again: int, number: int) -> Outcome:
+    """What comes of the storm of a number, flown in a process of its own; `again`: see `flown_again`."""
     quietly()
-    plan = storm_of(scenario, number)
+    try:
+        plan = storm_of(scenario, number)
+    except UserError as refused:  # the others are flown all the same
+        return _unflown(Violation("a fleet is drawn", 0.0, "run", str(refused)))
     return flown_again(plan, number, fly_storm(plan), again)
 
 

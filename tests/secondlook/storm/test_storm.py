@@ -16,8 +16,9 @@ import secondlook
 from comms.said.messages import TaskAction
 from coordinator.fleet import GIVEN_UP_AFTER
 from secondlook.cli import app_for
+from secondlook.errors import UserError
 from secondlook.fleet.link import silent_after_ms_of
-from secondlook.scenario import load_scenario
+from secondlook.scenario import Scenario, load_scenario
 from secondlook.scenario.bundled import link_names
 from secondlook.storm import campaign
 from secondlook.storm.campaign import agreement, flown_again, storm_of, times_reached
@@ -120,6 +121,15 @@ def test_each_so_many_th_storm_is_flown_twice_and_over_zenoh(monkeypatch: pytest
     assert flown_again(plan, 40, first, 0) == first
     (found_again,) = flown_again(plan, 4, replace(first, digest="another"), 4).violations
     assert found_again.invariant == "the same digest again"
+
+
+def test_a_fleet_that_cannot_be_drawn_is_found_and_does_not_end_the_campaign(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(number: int) -> Scenario:
+        raise UserError("area.polygon_m: cuts the share of primary-2 in two")
+
+    monkeypatch.setattr(campaign, "draw_fleet", refuse)
+    (found,) = campaign.fly_number(None, 0, 7).violations
+    assert str(found).startswith("a fleet is drawn: area.polygon_m: cuts the share of primary-2 in two")
 
 
 def test_a_storm_is_the_same_over_zenoh() -> None:
