@@ -216,7 +216,8 @@ class LayerOf:
 
     def sums(self, tile: Tile) -> FloatArray:
         """What its stretches have seen of a tile: the sum over looks in nats, of the tile's shape."""
-        return self._layer.sum_nats[tile.window]
+        sums: FloatArray = self._layer.nats(tile.window)[0]
+        return sums
 
     def _add(self, stretch: Stretch) -> list[Told]:
         if stretch.curve and stretch.curve not in self._curves:
@@ -245,7 +246,7 @@ class LayerOf:
         self._version += 1
         sum_levels, largest_levels = self._layer.sum_levels[tile.window], self._layer.largest_levels[tile.window]
         if self.corrections.knows(tile):
-            sums, largest = self.sums(tile), self._layer.largest_nats[tile.window]
+            sums, largest = self._layer.nats(tile.window)
             seen = self.corrections.corrected(tile, sums)
             # Of one look all that was seen is the largest; of several the largest has its share.
             share = np.where(sums > 0.0, largest / np.where(sums > 0.0, sums, 1.0), 1.0)

@@ -6,17 +6,19 @@ decided on, is in whole levels of 0.02, so that everyone sees one map.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.types import BoolArray, FloatArray, GridSpec
+from planner.types import EVERYWHERE, BoolArray, FloatArray, GridSpec, Window
 
 NATS_PER_LEVEL = 0.02
 MOST_LEVELS = 255
 HIGHEST_P_DETECT = 0.999
+BLOCK = 64  # cells a side, in which the part that was looked at grows
 
 LevelArray = NDArray[np.uint8]
 
@@ -24,16 +26,17 @@ LevelArray = NDArray[np.uint8]
 class RiskLayer:
     """One vehicle's looks, summed over the grid (equation 2 of the paper, in logarithms).
 
-    All arrays have grid shape and change with each look. `sum_levels`: the sums in levels; they saturate at 255, a
-    residual risk of 0.006. `largest_levels`: the largest single looks in levels; they saturate at 255 (one look of P_d
-    0.994).
+    Arrays of grid shape, which change with each look: `sum_levels`, the sums in levels; they saturate at 255, a
+    residual risk of 0.006. `largest_levels`, the largest single looks in levels; they saturate at 255 (one look of P_d
+    0.994). The nats that they stand for are held of the part that was looked at alone: of a large fleet's area a
+    vehicle sees little.
     """
 
     def __init__(self, grid: GridSpec) -> None:
-        self.sum_nats: FloatArray = np.zeros(grid.shape)
-        self.largest_nats: FloatArray = np.zeros(grid.shape)
         self.sum_levels: LevelArray = np.zeros(grid.shape, dtype=np.uint8)
         self.largest_levels: LevelArray = np.zeros(grid.shape, dtype=np.uint8)
+        self._part: Window = (slice(0, 0), slice(0, 0))
+        self._nats: FloatArray = np.zeros((2, 0, 0))  # of the part: sums, and the largest single looks
 
     def add_look(self, rows: slice, columns: slice, p_detect: FloatArray) -> None:
         """Adds a look's P_d per cell of a window, 0 where a cell was not seen.
@@ -42,12 +45,52 @@ class RiskLayer:
         """
         if p_detect.size and not (float(p_detect.min()) >= 0.0 and float(p_detect.max()) <= HIGHEST_P_DETECT):
             raise ValueError(f"P_d outside 0 to {HIGHEST_P_DETECT}")
+        if not p_detect.size:
+            return
         nats = -np.log1p(-p_detect)
-        sums, largest = self.sum_nats[rows, columns], self.largest_nats[rows, columns]
+        sums, largest = self._held(*self._bounds((rows, columns)))
         sums += nats
         np.maximum(largest, nats, out=largest)
         self.sum_levels[rows, columns] = to_levels(sums)
         self.largest_levels[rows, columns] = to_levels(largest)
+
+    def nats(self, window: Window = EVERYWHERE) -> FloatArray:
+        """-ln(1 - P_d) of a window's cells, summed over looks, and of the largest single ones, shape (2, rows,
+        columns)."""
+        rows, columns = self._bounds(window)
+        found: FloatArray = np.zeros((2, rows.stop - rows.start, columns.stop - columns.start))
+        shared = [
+            slice(max(here.start, part.start), min(here.stop, part.stop))
+            for here, part in zip((rows, columns), self._part, strict=True)
+        ]
+        if all(one.start < one.stop for one in shared):
+            found[:, *_from(shared, (rows, columns))] = self._nats[:, *_from(shared, self._part)]
+        return found
+
+    def _bounds(self, window: Window) -> Window:
+        """The window by its first cells and those behind its last."""
+        rows, columns = (slice(*one.indices(size)[:2]) for one, size in zip(window, self.sum_levels.shape, strict=True))
+        return rows, columns
+
+    def _held(self, rows: slice, columns: slice) -> FloatArray:
+        """What is held of a window, to be changed there; of more than before where it reaches farther."""
+        part = [
+            (min(held.start, here.start), max(held.stop, here.stop)) if held.stop else (here.start, here.stop)
+            for held, here in zip(self._part, (rows, columns), strict=True)
+        ]
+        if part != [(held.start, held.stop) for held in self._part]:
+            larger = [
+                slice(first - first % BLOCK, min(end + -end % BLOCK, size))
+                for (first, end), size in zip(part, self.sum_levels.shape, strict=True)
+            ]
+            self._nats, self._part = self.nats((larger[0], larger[1])), (larger[0], larger[1])
+        held: FloatArray = self._nats[:, *_from((rows, columns), self._part)]
+        return held
+
+
+def _from(window: Sequence[slice], part: Window) -> list[slice]:
+    """A window of the grid as one of a part of it."""
+    return [slice(one.start - of.start, one.stop - of.start) for one, of in zip(window, part, strict=True)]
 
 
 def to_levels(nats: FloatArray) -> LevelArray:

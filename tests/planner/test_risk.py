@@ -22,6 +22,7 @@ from planner.risk import (
 from planner.types import EVERYWHERE, FloatArray, GridSpec, SweepFrame
 
 GRID = GridSpec(SweepFrame(0, 0, 0), 5, columns=4, rows=3)
+LARGE = GridSpec(SweepFrame(0, 0, 0), 5, columns=150, rows=200)
 
 P_DETECT = st.sampled_from([0.0, 1e-4, 0.005, 0.999]) | st.floats(0, 0.999)
 looks = st.lists(arrays(np.float64, GRID.shape, elements=P_DETECT), min_size=1, max_size=6)
@@ -39,12 +40,19 @@ def levels(*values: int) -> LevelArray:
     return np.array(values, dtype=np.uint8)
 
 
+def windows(grid: GridSpec) -> st.SearchStrategy[tuple[slice, slice]]:
+    rows, columns = (
+        st.tuples(st.integers(0, size), st.integers(0, size)).map(lambda ends: slice(*sorted(ends)))
+        for size in grid.shape
+    )
+    return st.tuples(rows, columns)
+
+
 class TestRiskLayer:
     def test_starts_without_any_look(self) -> None:
         layer = RiskLayer(GRID)
-        assert layer.sum_nats.shape == layer.largest_nats.shape == (3, 4)
-        assert not layer.sum_nats.any()
-        assert not layer.largest_nats.any()
+        assert layer.nats().shape == (2, 3, 4)
+        assert not layer.nats().any()
         assert not layer.sum_levels.any()
         assert not layer.largest_levels.any()
 
@@ -54,30 +62,43 @@ class TestRiskLayer:
         layer.add_look(slice(0, 2), slice(2, 3), np.array([[0.2], [0.2]]))
         expected = np.zeros((3, 4))
         expected[0, 2], expected[1, 2] = -math.log(0.8), -math.log(0.4)
-        assert layer.sum_nats == pytest.approx(expected)
+        assert layer.nats()[0] == pytest.approx(expected)
         # 0.223 and 0.916 nats.
         assert layer.sum_levels.tolist() == [[0, 0, 11, 0], [0, 0, 46, 0], [0, 0, 0, 0]]
         expected[1, 2] = -math.log(0.5)
-        assert layer.largest_nats == pytest.approx(expected)
+        assert layer.nats()[1] == pytest.approx(expected)
         assert layer.largest_levels.tolist() == [[0, 0, 11, 0], [0, 0, 35, 0], [0, 0, 0, 0]]
 
     def test_takes_a_look_that_misses_the_grid(self) -> None:
         layer = layer_of()
         layer.add_look(slice(0, 0), slice(0, 0), np.zeros((0, 0)))
-        assert not layer.sum_nats.any()
+        assert not layer.nats()[0].any()
 
     @given(looks)
     def test_keeps_the_sum_over_looks_and_the_largest_of_them(self, p_detect: list[FloatArray]) -> None:
         layer = layer_of(*p_detect)
         nats = [-np.log(1 - look) for look in p_detect]
-        assert layer.sum_nats == pytest.approx(np.sum(nats, axis=0), abs=1e-12)
-        assert layer.largest_nats == pytest.approx(np.max(nats, axis=0), abs=1e-12)
+        assert layer.nats()[0] == pytest.approx(np.sum(nats, axis=0), abs=1e-12)
+        assert layer.nats()[1] == pytest.approx(np.max(nats, axis=0), abs=1e-12)
+
+    @given(st.lists(windows(LARGE), max_size=6), windows(LARGE))
+    def test_the_part_that_is_held_grows_with_the_looks(
+        self, looked_at: list[tuple[slice, slice]], asked: tuple[slice, slice]
+    ) -> None:
+        layer, expected = RiskLayer(LARGE), np.zeros((2, *LARGE.shape))
+        for number, window in enumerate(looked_at, start=1):
+            p_detect = np.full(expected[0][window].shape, 0.1 * number)
+            layer.add_look(*window, p_detect)
+            expected[0][window] += -np.log1p(-p_detect)
+            expected[1][window] = -np.log1p(-p_detect)
+        assert layer.nats().tolist() == expected.tolist()
+        assert layer.nats(asked).tolist() == expected[:, *asked].tolist()
 
     @given(looks)
     def test_levels_are_those_of_the_layer_as_it_is(self, p_detect: list[FloatArray]) -> None:
         layer = layer_of(*p_detect)
-        assert layer.sum_levels.tolist() == to_levels(layer.sum_nats).tolist()
-        assert layer.largest_levels.tolist() == to_levels(layer.largest_nats).tolist()
+        assert layer.sum_levels.tolist() == to_levels(layer.nats()[0]).tolist()
+        assert layer.largest_levels.tolist() == to_levels(layer.nats()[1]).tolist()
         assert (layer.largest_levels <= layer.sum_levels).all()
 
     @given(looks)
@@ -94,7 +115,7 @@ class TestRiskLayer:
         look[1, 1] = p_detect
         with pytest.raises(ValueError, match=r"0 to 0\.999"):
             layer.add_look(*EVERYWHERE, look)
-        assert not layer.sum_nats.any()
+        assert not layer.nats()[0].any()
         assert not layer.sum_levels.any()
 
 

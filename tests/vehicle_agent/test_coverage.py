@@ -105,7 +105,7 @@ def test_where_the_best_look_counts_a_cell_has_the_mean_of_its_bins(layer: Cover
     by_place = np.array([0.2, 0.4, 0.3, 0.3, 0.3])  # 0 m to 4 m beside a cell's centre
     track = Maneuver(1, ManeuverKind.FOLLOW, 50, 0, 50, 100, 20)
     layer.add(look(track, 1, 0, 4, lambda range_m: by_place[range_m.astype(int) % 5]))
-    cells = layer.layer.largest_nats[0, 12:36]  # from 10 m beside the track on
+    cells = layer.layer.nats()[1][0, 12:36]  # from 10 m beside the track on
     assert cells == pytest.approx(-np.log1p(-counts))
 
 

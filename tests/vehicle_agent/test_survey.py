@@ -485,10 +485,10 @@ class TestTracksThatGoWrong:
             agent.hear(f"veh/{PRIMARY}/look", look(maneuver, 1, 0, 4, SEES_TO_130_M))
         layer = agent.node.coverage.layer  # type: ignore[attr-defined]
         column = round((maneuver.start_x_m + 50) / 10)
-        assert layer.sum_nats[0, column] == pytest.approx(-math.log(0.7))
+        assert layer.nats()[0][0, column] == pytest.approx(-math.log(0.7))
         # Of a vehicle that was started anew it is another.
         agent.hear(f"veh/{PRIMARY}/look", look(maneuver, 1, 0, 4, SEES_TO_130_M), incarnation=1)
-        assert layer.sum_nats[0, column] == pytest.approx(-2 * math.log(0.7))
+        assert layer.nats()[0][0, column] == pytest.approx(-2 * math.log(0.7))
 
     def test_a_look_of_another_manoeuvre_is_coverage_but_teaches_nothing_about_this_track(self) -> None:
         agent = on_its_way()
@@ -500,7 +500,7 @@ class TestTracksThatGoWrong:
         assert (curve.r_eff_m, curve.p_detect[40]) == (130, 0.3)
         layer = agent.node.coverage.layer  # type: ignore[attr-defined]
         column = round((maneuver.start_x_m + 50) / 10)
-        assert layer.sum_nats[0, column] == pytest.approx(-math.log(0.1) - math.log(0.7))
+        assert layer.nats()[0][0, column] == pytest.approx(-math.log(0.1) - math.log(0.7))
 
     def test_an_invalid_look_is_no_coverage(self) -> None:
         agent = on_its_way()

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 import re
-from itertools import combinations
+from collections import Counter
+from itertools import combinations, pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +23,7 @@ from planner.types import FloatArray
 from secondlook.errors import UserError
 from secondlook.launch.run_display import closing_table
 from secondlook.recorded.closest_approach import NEAR_M, Closest, ClosestApproaches
-from secondlook.recorded.whereabouts import Whereabouts
+from secondlook.recorded.whereabouts import Place, Whereabouts
 from secondlook.testing import Fleet, assert_kept_apart, assert_no_strip_lost
 
 
@@ -191,6 +193,27 @@ class TestTheFigure:
             assert told_m == pytest.approx(least_m[pair], abs=1e-6)
         for pair, apart_m in least_m.items():
             assert pair in found or apart_m > max(NEAR_M, *(nearest_m[name] for name in pair)) - 1e-6
+
+    def test_who_sails_side_by_side_is_compared_with_its_neighbours_alone(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        names, compared = [f"v{number:02}" for number in range(40)], Counter[tuple[str, str]]()
+        figure, compare = ClosestApproaches(dict.fromkeys(names, 2.0)), ClosestApproaches._compare
+
+        def count(self: ClosestApproaches, pair: tuple[str, str], *legs: Any) -> None:
+            compared[pair] += 1
+            compare(self, pair, *legs)
+
+        monkeypatch.setattr(ClosestApproaches, "_compare", count)
+        for t_s in range(60):
+            for place, name in enumerate(names):
+                figure.hear(Place(name, t_s, (1500.0 * place, 2.0 * t_s), moves=True, counts=True, is_true=False))
+        neighbours = list(pairwise(names))
+        assert [one.vehicles for one in figure.found()] == neighbours
+        assert all(one.closest_m == 1500 for one in figure.found())
+        # Of all others each is compared when it is heard first, and perhaps with a leg beside that.
+        others = sum(compared.values()) - sum(compared[pair] for pair in neighbours)
+        assert others <= 4 * math.comb(len(names), 2)
 
 
 def least_apart_m(apart: FloatArray) -> float:
