@@ -149,9 +149,9 @@ class StripLife:
             elif status.state is not TaskState.REFUSED and record is not None and record.vehicle == name:
                 self._await_no_more(record, now_ms)
             return
-        if status.state is TaskState.REFUSED and vehicle.refuses_older(status.strip):
-            return  # what it says to the newest offer is to come
         if status.state is TaskState.REFUSED:
+            if vehicle.refuses_older(status.strip):
+                return  # what it says to the newest offer is to come
             self._sectors.assign_by(now_ms, record.window)
         else:
             self._sectors.cut_by(now_ms, [record.window])

@@ -43,10 +43,10 @@ class RiskLayer:
 
         Raises ValueError for P_d outside [0, 0.999].
         """
-        if p_detect.size and not (float(p_detect.min()) >= 0.0 and float(p_detect.max()) <= HIGHEST_P_DETECT):
-            raise ValueError(f"P_d outside 0 to {HIGHEST_P_DETECT}")
         if not p_detect.size:
             return
+        if not (float(p_detect.min()) >= 0.0 and float(p_detect.max()) <= HIGHEST_P_DETECT):
+            raise ValueError(f"P_d outside 0 to {HIGHEST_P_DETECT}")
         nats = -np.log1p(-p_detect)
         sums, largest = self._held(*self._bounds((rows, columns)))
         sums += nats

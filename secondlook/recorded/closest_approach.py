@@ -83,7 +83,7 @@ class ClosestApproaches:
         if name not in self._legs:
             for other in self._legs:
                 heappush(self._looks[other], (0.0, name))
-            self._looks[name] = [(0.0, other) for other in self._legs]
+            self._looks[name] = [(0.0, other) for other in sorted(self._legs)]
             self._legs[name] = deque(maxlen=LEGS_KEPT)
         legs = self._legs[name]
         if place.is_true and name not in self._told_true:  # where it believed to be it was not
