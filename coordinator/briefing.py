@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -11,6 +12,7 @@ from coordinator.allocate.situation import Helper, OpenStrip, Situation
 from coordinator.config import CoordinatorConfig
 from coordinator.cut.strips import Counted
 from coordinator.fleet import KnownFleet
+from coordinator.goal import GoalWatch
 from coordinator.ledger import Ledger, StripRecord
 from coordinator.sectors import Sector
 from coordinator.vehicles import KnownVehicle, pose_of, way_home_of
@@ -27,8 +29,11 @@ class Briefing:
     """Reads ledger and vehicles as they are when it is asked; changes none of them. `p_detect`: what a look along a
     strip was expected to have when it was cut."""
 
-    def __init__(self, config: CoordinatorConfig, ledger: Ledger, fleet: KnownFleet, p_detect: float) -> None:
+    def __init__(
+        self, config: CoordinatorConfig, ledger: Ledger, fleet: KnownFleet, goal: GoalWatch, p_detect: float
+    ) -> None:
         self._config = config
+        self._goal = goal
         self._p_detect = p_detect
         self._ledger = ledger
         self._vehicles = fleet.vehicles
@@ -38,13 +43,15 @@ class Briefing:
         """What is decided on now in a sector: of its open strips, and for who is in its team, by name."""
         records = [one for one in self._ledger.in_state(StripState.OPEN) if sector.holds(one.window)]
         found = (self._helper(self._vehicles[name], records, now_ms) for name in sorted(sector.team))
+        deadline_s = self.expected_deadline_s()
         return Situation(
             now_s=now_ms / 1000,
-            deadline_s=self.expected_deadline_s(),
+            deadline_s=deadline_s,
             strips=tuple(self.open_strip(record) for record in records),
             helpers=tuple(helper for helper in found if helper is not None),
             switch_margin=self._config.switch_margin,
             price=sector.price / self._p_detect,
+            soonest=math.isfinite(deadline_s) and self._goal.is_near,
         )
 
     def expected_deadline_s(self) -> float:

@@ -128,10 +128,10 @@ class Coordinator:
         goal = GoalWatch(config.goal, fleet, contacts, region, inside, agenda, now_ms)
         self._end = MissionEnd(config, fleet, strips, sectors, goal, agenda, outbox)
         if narrowest is not None:
-            self._briefing = briefing = Briefing(config, ledger, fleet, p_detect)
+            self._briefing = briefing = Briefing(config, ledger, fleet, goal, p_detect)
             weights = weights_over(run.grid.spec, inside, config.priorities)
             self._cutting = [
-                StripCutting(narrowest, config, weights, one, len(sectors.all), briefing, fleet, contacts, strips)
+                StripCutting(narrowest, config, weights, one, len(sectors.all), briefing, goal, fleet, contacts, strips)
                 for one in sectors.all
             ]
             if config.strips == "beforehand":

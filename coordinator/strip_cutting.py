@@ -20,6 +20,7 @@ from coordinator.cut.room import Room
 from coordinator.cut.strips import Counted, Cut, CuttingRules
 from coordinator.expect.contacts import KnownContacts
 from coordinator.fleet import KnownFleet
+from coordinator.goal import GoalWatch
 from coordinator.ledger import TAKEN
 from coordinator.reasons import ACROSS, Reasons
 from coordinator.sectors import Sector
@@ -49,6 +50,7 @@ class StripCutting:
         sector: Sector,
         sectors: int,
         briefing: Briefing,
+        goal: GoalWatch,
         fleet: KnownFleet,
         contacts: KnownContacts,
         strips: StripLife,
@@ -75,6 +77,8 @@ class StripCutting:
         self._sector = sector
         self._grid = grid
         self._briefing = briefing
+        self._goal = goal
+        self._goal_m2 = goal.area_m2(sector.window, area_m2)
         self._fleet = fleet
         self._strips = strips
 
@@ -121,6 +125,7 @@ class StripCutting:
             objective=self._objective,
             threshold=self._cutter.threshold,
             contacts=None if contacts is None else self._objective.mean * contacts,
+            goal_m2=self._goal_m2,
         )
         flown_anyway = [*ledger.in_state(*TAKEN), *self._strips.awaited]
         claimed = [one.window.within(place) for one in flown_anyway if one.window.shared(place)]
@@ -130,6 +135,7 @@ class StripCutting:
         time_m, flown = self._briefing.time_m(situation, sector), self._flown(situation)
         cuts = self._cutter.cut(ground, time_m, claimed, opened, flown, again=again)
         sector.price, sector.is_worth, sector.present = self._cutter.price, bool(cuts), len(situation.helpers)
+        self._goal.hear_expected(sector.number, *self._cutter.leaves_m2)
         for found in cuts:
             cut = replace(found, window=found.window.moved(place.first_row, place.first_column))
             alike = (record for record in unmatched if record.window.across == cut.window.across)

@@ -123,14 +123,14 @@ class StripLife:
         `was_idle`: whether it was idle by the state before.
         """
         if vehicle.is_at_a_strip:
-            if vehicle.tells_news_of(state.works_on, header):
+            if vehicle.hear_word_of(state.works_on, header):
                 self._hear_at_work(state.works_on, vehicle, header, now_ms, under_way=state.mode is Mode.REVISIT)
         elif (was_idle and vehicle.is_idle) or state.mode.is_out_of_work:
             self._hear_no_work(vehicle, header, now_ms)
 
     def hear_status(self, vehicle: KnownVehicle, header: Header, status: TaskStatus, now_ms: int) -> None:
         """A vehicle tells how far it is with a strip."""
-        if not vehicle.tells_news_of(status.strip, header):
+        if not vehicle.hear_word_of(status.strip, header):
             return
         vehicle.unanswered = 0
         if status.state in (TaskState.ACCEPTED, TaskState.UNDER_WAY):
@@ -150,7 +150,7 @@ class StripLife:
                 self._await_no_more(record, now_ms)
             return
         if status.state is TaskState.REFUSED:
-            if vehicle.refuses_older(status.strip):
+            if vehicle.answer_older(status.strip):
                 return  # what it says to the newest offer is to come
             self._sectors.assign_by(now_ms, record.window)
         else:
@@ -317,7 +317,7 @@ class StripLife:
         what it had agreed to do next is forgotten."""
         name = vehicle.entry.vehicle
         for record in self._answered():
-            if record.vehicle == name and vehicle.tells_news_of(record.strip.number, header):
+            if record.vehicle == name and vehicle.hear_word_of(record.strip.number, header):
                 if self._seen_share(record) >= COVERED_SHARE:
                     vehicle.failures = 0
                     self._move(record, StripState.DONE, now_ms, f"seen by {name}, whose word on it was lost", name)

@@ -300,8 +300,8 @@ class KnownVehicle:
             return self.finished_ms
         return expected_end_ms(self.entry, self.state, self.plan, self.heard_ms, self.keep_out, self.flows)
 
-    def tells_news_of(self, strip: int, header: Header) -> bool:
-        """Whether a message about a strip is newer than all that it has told of it; notes it."""
+    def hear_word_of(self, strip: int, header: Header) -> bool:
+        """Notes a message about a strip; whether it is newer than all that it had told of it."""
         order = (header.incarnation, header.sequence)
         if order <= self._task_orders.get(strip, _NONE_YET):
             return False
@@ -316,8 +316,8 @@ class KnownVehicle:
         older = before.older + 1 if before is not None and is_open and newest == before.newest else 0
         self.offers[number] = replace(offer, newest=newest, older=older)
 
-    def refuses_older(self, number: int) -> bool:
-        """Whether a refusal of a strip may be of an offer that was made before the newest; that is answered then."""
+    def answer_older(self, number: int) -> bool:
+        """Counts a refusal of a strip for an offer that was made before the newest; whether there was any to answer."""
         offer = self.offers.get(number)
         if offer is None or not offer.older:
             return False

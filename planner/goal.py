@@ -54,6 +54,14 @@ class Goal:
         """Whether it is so with the chance that is wanted."""
         return round(self.chance_now(left), DECIMALS) >= self.chance
 
+    def nats_lacking(self, left: MinesLeft) -> float:
+        """By how many nats what is left must still fall, about: the logarithm of the share of mines left, with the
+        chance that is wanted, for the share that may be; where none may be left, of how many are expected for how many
+        may be. 0 or less where the goal is reached."""
+        if self.clearance < 1.0:
+            return _log(1.0 - left.clearance_with(self.chance)) - math.log(1.0 - self.clearance)
+        return _log(-_log(self.chance_now(left))) - math.log(-math.log(self.chance))
+
     @property
     def words(self) -> str:
         """What is wanted."""
@@ -74,6 +82,10 @@ class Goal:
             return f"the chance is {_told(now):.3f}"
         cleared = left.clearance_with(self.chance)
         return f"the chance is {_told(now):.3f}, and with {self.chance:.3g} the clearance is {_told(cleared):.3f}"
+
+
+def _log(share: float) -> float:
+    return math.log(share) if share > 0.0 else -math.inf
 
 
 def _told(chance: float) -> float:

@@ -9,6 +9,9 @@ not that it leaves a good strip for later. (Team orienteering; the estimate is t
 That estimate pools the helpers' time, as if two of them could fly half a strip each, and does not see what the deadline
 will cut off. So which plan is taken is decided otherwise: each one kept on the way is gone on with to the deadline by
 what brings most a second, and of all that come of it the best is taken.
+
+A plan to the deadline does not care what comes first. So where the mission is expected to end before, with its goal,
+nothing is planned: each helper is offered what brings most a second.
 """
 
 from __future__ import annotations
@@ -53,6 +56,8 @@ class RoutesAllocator:
 
     def assign(self, situation: Situation) -> Mapping[str, int]:
         """See `Allocator`."""
+        if situation.soonest:
+            return GreedyAllocator().assign(situation)
         helpers = sorted(situation.helpers, key=lambda one: one.vehicle)
         if not situation.strips or all(one.sweeping for one in helpers):
             return {}

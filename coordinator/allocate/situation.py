@@ -94,7 +94,8 @@ class Situation:
     `deadline_s`: when the mission is expected to be over, infinite while nobody can tell. `strips`: the open ones.
     `helpers`: those that are there. `switch_margin`: share of a task's worth by which turning a helper round must be
     better. `price`: what a metre flown brings where strips are cut, as what they count per metre; 0 while nothing is
-    known of it.
+    known of it. `soonest`: whether what is worth most is to be removed as soon as may be, as the mission's goal is
+    expected to be reached before the deadline with much to spare.
     """
 
     now_s: float
@@ -103,6 +104,7 @@ class Situation:
     helpers: tuple[Helper, ...]
     switch_margin: float = 0.2
     price: float = 0.0
+    soonest: bool = False
 
     @property
     def free(self) -> tuple[Helper, ...]:

@@ -57,6 +57,8 @@ class Cutter:
         self._searches = 0
         self.threshold = 0.0
         """Residual risk from which on a cell will be of the worst, see `Ground`."""
+        self.leaves_m2 = 0.0, 0.0
+        """What helpers are expected to leave where the goal is, see `Ground.left_of_goal_m2`."""
 
     @property
     def price(self) -> float:
@@ -88,7 +90,7 @@ class Cutter:
         best, after = [window.in_blocks(self._block) for window in opened], left
         if time_m > 0:  # else nobody can be sent any more, and what is open is left as it is
             best, after = self._best(left, time_m, best, flown)
-        self.threshold = after.worst_from()
+        self.threshold, self.leaves_m2 = after.worst_from(), after.left_of_goal_m2()
         told = list[Window]()
         for window in best:
             if again or not window.is_at_one_of(told):

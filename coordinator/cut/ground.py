@@ -39,7 +39,8 @@ class Ground:
     have beyond it (the conditional value at risk as Rockafellar and Uryasev write it, 2000).
     `contacts`, shape (2, rows, columns): what a look at the objects in a cell counts beside that (residual risk times
     m2), from a strip along the tracks and from one across; None where contacts count for nothing. Looked at once they
-    count no more: what was found then tells anew.
+    count no more: what was found then tells anew. `goal_m2`: how much of each cell counts of what the mission's goal
+    asks for; None where there is none.
     """
 
     risk: FloatArray
@@ -49,6 +50,7 @@ class Ground:
     objective: Objective
     threshold: float
     contacts: FloatArray | None = None
+    goal_m2: FloatArray | None = None
 
     def copy(self) -> Ground:
         """One that may be flown."""
@@ -66,6 +68,7 @@ class Ground:
             weights=self.weights.T,
             is_seen=self.is_seen.T,
             contacts=None if self.contacts is None else self.contacts[::-1].transpose(0, 2, 1),
+            goal_m2=None if self.goal_m2 is None else self.goal_m2.T,
         )
 
     def in_blocks(self, block: int) -> Ground:
@@ -83,6 +86,7 @@ class Ground:
             weights=weights_of,
             is_seen=seen > weights_of / 2,
             contacts=None if self.contacts is None else np.stack([_sums(one, block) for one in self.contacts]),
+            goal_m2=None if self.goal_m2 is None else _sums(np.where(self.risk > 0, self.goal_m2, 0.0), block),
         )
 
     def fly(self, window: Window, share: float = 1.0) -> None:
@@ -107,6 +111,13 @@ class Ground:
         if self.contacts is not None:
             left_m2 += float(self.contacts.max(axis=0).sum())
         return left_m2
+
+    def left_of_goal_m2(self) -> tuple[float, float]:
+        """What is left where the mission's goal is (residual risk times m2), and how much of that is looked at, m2."""
+        if self.goal_m2 is None:
+            return 0.0, 0.0
+        there = self.risk > 0
+        return float((self.goal_m2 * self.risk).sum()), float(self.goal_m2[there].sum())
 
     def worst_from(self) -> float:
         """The residual risk from which on cells are of the worst of those that are looked at, as it is now."""

@@ -65,7 +65,7 @@ from vehicle_agent.config import Homing, RevisitConfig, SurveyConfig, SurveyRevi
 
 AS_CONVEX = 1e-6
 """Share of its area that an outline's dents may have for it to count as convex."""
-LANE_WEIGHT = 10.0
+LANE_WEIGHT = 30.0
 """So many times counts the risk in the lane that is the mission's goal."""
 
 

@@ -53,7 +53,7 @@ class NoneLeftGoal(Mapping):
 
 class LaneGoal(Mapping):
     """That a ship may pass along a lane. Without `area.priorities` second looks then go to the lane first, whose risk
-    counts ten times."""
+    counts thirty times."""
 
     kind: Literal["lane"]
     lane_m: Annotated[

@@ -13,6 +13,7 @@ from sectors_by_hand import sector, whole
 from comms.said.announcement import Role, Vertex, Zone
 from comms.said.codec import Header
 from comms.said.messages import AgentState, Mode, Plan, PlannedTrack, StripState
+from coordinator.agenda import Agenda
 from coordinator.allocate.service import Service
 from coordinator.allocate.simple import GreedyAllocator
 from coordinator.allocate.situation import Situation
@@ -20,15 +21,25 @@ from coordinator.briefing import Briefing
 from coordinator.config import CoordinatorConfig
 from coordinator.cut.strips import Cut
 from coordinator.cut.window import Window
+from coordinator.expect.contacts import KnownContacts
 from coordinator.fleet import KnownFleet
+from coordinator.goal import GoalWatch
 from coordinator.ledger import Ledger, StripRecord
 from coordinator.vehicles import MOST_FAILURES, Offer
 from planner.dubins import Pose
+from planner.region import Region
 
 CONFIG = CoordinatorConfig(GreedyAllocator(), 1.05, 30_000, 30_000, 30, 400, 0.3, 0.2)
 LEVELS = np.zeros((60, 10), dtype=np.uint8)
 AHEAD = replace(CONFIG, ahead_ms=60_000)
 LEAVES = AgentState(Mode.RETURNING, 0, 0.1, 0, 122.5, 0, 0)
+
+
+def briefing_of(config: CoordinatorConfig, fleet: KnownFleet, ledger: Ledger | None = None) -> Briefing:
+    """That of a mission without a goal."""
+    inside = np.ones(fleet.map.grid.shape, dtype=np.bool_)
+    goal = GoalWatch(None, fleet, KnownContacts(fleet, inside), Region(run_info(400, 400).outline), inside, Agenda(), 0)
+    return Briefing(config, Ledger() if ledger is None else ledger, fleet, goal, 0.7)
 
 
 class Known:
@@ -38,7 +49,7 @@ class Known:
         run = replace(run_info(400, 400), keep_out=keep_out)
         self.fleet = KnownFleet(run, config.silent_after_ms, config.lost_after_ms, 0)
         self.ledger = Ledger()
-        self.briefing = Briefing(config, self.ledger, self.fleet, 0.7)
+        self.briefing = briefing_of(config, self.fleet, self.ledger)
         self.sector = whole(self.fleet)
 
     def heard(self, name: str, mode: Mode, works_on: int = 0, end_ms: int = 0, battery: float = 1.0) -> None:
@@ -91,7 +102,7 @@ class TestTheTimeLeft:
 
 def test_the_deadline_hangs_on_the_last_of_several_primaries_and_is_not_known_until_all_are() -> None:
     fleet = KnownFleet(run_info(400, 400, vehicles=(*FLEET, vehicle("other", Role.SURVEY))), 30_000, 30_000, 0)
-    briefing = Briefing(replace(CONFIG, deadline_s=9000.0), Ledger(), fleet, 0.7)
+    briefing = briefing_of(replace(CONFIG, deadline_s=9000.0), fleet)
     plan = Plan(1, (PlannedTrack(1, 0, 0, 0, 0, 400, False),), (), (), "")
     for name, end_ms, deadline_s in ((PRIMARY, 1_000_000, 9000.0), ("other", 2_000_000, 2100.0)):
         fleet.vehicles[name].hear_survey(Header(name, 0, 1, 0), plan)
@@ -105,7 +116,7 @@ def test_a_helper_s_battery_lasts_to_its_reserve_less_ten_seconds() -> None:
     fleet = KnownFleet(run_info(400, 400, vehicles=(FLEET[0], entry)), 30_000, 30_000, 0)
     state = AgentState(Mode.IDLE, 0, 0.5, 0, 122.5, 0, 0)
     fleet.vehicles[HELPER].hear_state(Header(HELPER, 0, 1, 50_000), state, 50_000)
-    (helper,) = Briefing(CONFIG, Ledger(), fleet, 0.7).situation(60_000, whole(fleet)).helpers
+    (helper,) = briefing_of(CONFIG, fleet).situation(60_000, whole(fleet)).helpers
     assert helper.lasts_until_s == pytest.approx(50 + 500 - 100 - 10)
 
 

@@ -911,7 +911,7 @@ class TestWhoIsAtAnother:
         lives.offered(HELPER, IN_THE_WEST)
         lives.next_of(HELPER, IN_THE_EAST)
         old = lives.header(HELPER)
-        lives.vehicle(HELPER).tells_news_of(1, lives.header(HELPER))
+        lives.vehicle(HELPER).hear_word_of(1, lives.header(HELPER))
         lives.sees(HELPER, range(80))
         lives.tell(HELPER, 2, TaskState.ACCEPTED, header=old)
         assert lives.states() == [OPEN, ACCEPTED]

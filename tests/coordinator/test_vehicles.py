@@ -341,9 +341,9 @@ class TestTrust:
         one = KnownVehicle(vehicle("one", Role.REVISIT), 0)
         headers = {(start, number): Header("one", start, number, 0) for start in (0, 1) for number in range(3)}
         assert not one.has_told_since(headers[0, 0], 7)
-        news = [one.tells_news_of(7, headers[at]) for at in ((0, 0), (0, 0), (0, 2), (0, 1), (1, 0), (0, 2))]
+        news = [one.hear_word_of(7, headers[at]) for at in ((0, 0), (0, 0), (0, 2), (0, 1), (1, 0), (0, 2))]
         assert news == [True, False, True, False, True, False]
-        assert one.tells_news_of(8, headers[0, 0])
+        assert one.hear_word_of(8, headers[0, 0])
         assert [one.has_told_since(headers[at], 7) for at in ((0, 2), (1, 0), (1, 1))] == [True, False, False]
         assert [one.has_told_since(headers[at], 8) for at in ((0, 0), (0, 1))] == [False, False]
 

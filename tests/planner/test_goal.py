@@ -50,6 +50,25 @@ def test_the_last_bits_of_a_chance_decide_nothing(last_bits: float) -> None:
     assert not Goal(1.0, 0.900001).is_reached(left)
 
 
+def test_so_many_nats_lack_as_what_is_left_is_more_than_may_be() -> None:
+    left = left_of(0.15, 100)
+    cleared = left.clearance_with(0.9)
+    assert Goal(cleared, 0.9).nats_lacking(left) == pytest.approx(0.0)
+    # Of 1 - cleared half may be left, and a quarter.
+    assert Goal((1.0 + cleared) / 2.0, 0.9).nats_lacking(left) == pytest.approx(math.log(2.0))
+    assert Goal((3.0 + cleared) / 4.0, 0.9).nats_lacking(left) == pytest.approx(math.log(4.0))
+    assert Goal(cleared / 2.0, 0.9).nats_lacking(left) < 0.0
+
+
+def test_where_none_may_be_left_so_many_nats_lack_as_more_are_expected_than_may_be() -> None:
+    # None is left with chances of 0.9 and of 0.9 ** 4: a tenth and some, and four times as much.
+    left = MinesLeft(0.1, 0, 1, 0.9**4, 0.99, np.array([0.9**4, 1.0]), np.ones(10))
+    assert Goal(1.0, 0.9).nats_lacking(left) == pytest.approx(math.log(4.0))
+    assert Goal(1.0, 0.9**8).nats_lacking(left) == pytest.approx(-math.log(2.0))
+    for chance, nats in ((0.0, math.inf), (1.0, -math.inf)):
+        assert Goal(1.0, 0.9).nats_lacking(replace(left, reached=np.array([chance, 1.0]))) == nats
+
+
 def test_what_is_missed_by_little_is_not_told_as_reached() -> None:
     left = MinesLeft(0.1, 0, 1, 0.8996, 0.99, np.array([0.8996, 1.0]), np.ones(10))
     assert Goal(1.0, 0.9).words_now(left) == "the chance is 0.899"

@@ -436,6 +436,19 @@ class TestTurningRound:
         assert PLAN.assign(told) == {}
 
 
+class TestSoonest:
+    def test_what_brings_more_a_second_comes_first_though_there_is_time_for_both(self) -> None:
+        # The near one takes 150 s and brings 300 m2 by then, the far one 400 s and 1100.
+        told = situation([replace(NEAR, risk_m2=300), replace(FAR, risk_m2=1100)], [helper()])
+        assert PLAN.assign(told) == {"alpha": 2}
+        assert PLAN.assign(replace(told, soonest=True)) == {"alpha": 1}
+
+    @settings(max_examples=100, deadline=None)
+    @given(told=situations())
+    def test_it_offers_what_the_greedy_allocator_does(self, told: Situation) -> None:
+        assert PLAN.assign(replace(told, soonest=True)) == GreedyAllocator().assign(told)
+
+
 class TestAgainstAllOrders:
     @settings(max_examples=60, deadline=None)
     @given(told=situations(most_strips=4))

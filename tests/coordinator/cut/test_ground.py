@@ -89,6 +89,19 @@ class TestLeft:
         assert ground(np.zeros((2, 3)), objective="both").left_m2() == 0.0
 
 
+class TestLeftOfGoal:
+    def test_it_is_the_risk_where_the_goal_is_and_second_looks_go(self) -> None:
+        one = replace(ground(np.array([[0.8, 0.4, 0.0]])), goal_m2=np.array([[25.0, 10.0, 25.0]]))
+        assert one.left_of_goal_m2() == pytest.approx((24.0, 35.0))
+        one.fly(Window(0, 1, 0, 1))
+        assert one.left_of_goal_m2() == pytest.approx((14.0, 35.0))
+        assert one.turned.left_of_goal_m2() == pytest.approx((14.0, 35.0))
+        assert one.in_blocks(3).left_of_goal_m2() == pytest.approx((0.4 * 35.0, 35.0))  # 0.4 everywhere
+
+    def test_without_a_goal_there_is_none(self) -> None:
+        assert ground(np.ones((2, 2))).left_of_goal_m2() == (0.0, 0.0)
+
+
 class TestTurned:
     def test_what_lies_across_runs_up_its_rows_and_flying_the_one_flies_the_other(self) -> None:
         one = ground(np.arange(6.0).reshape(2, 3) / 6, look=0.5)
