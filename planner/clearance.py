@@ -91,14 +91,16 @@ class MinesLeft:
         """The largest share of which `chance_of_clearance` tells at least this chance, in (0, 1); to 9 decimals, and 0
         where it tells it of none."""
         found = _poisson_binomial(self.listed)
+
+        def is_told(share: float) -> bool:
+            return share <= 1.0 and round(self._chance(share, found), DECIMALS) >= chance
+
         low, high = 0.0, 1.0 + 2.0**-30
         while high - low > 2.0**-31:  # of `low` it is told, of `high` it is not
             share = (low + high) / 2.0
-            if share <= 1.0 and round(self._chance(share, found), DECIMALS) >= chance:
-                low = share
-            else:
-                high = share
-        return round(low, DECIMALS)
+            low, high = (share, high) if is_told(share) else (low, share)
+        share = round(low, DECIMALS)
+        return share if share == 0.0 or is_told(share) else round(share - 10.0**-DECIMALS, DECIMALS)
 
     def _chance(self, share: float, found: FloatArray) -> float:
         may_be_left = np.floor(np.round(np.arange(len(found)) * (1.0 / share - 1.0), DECIMALS))

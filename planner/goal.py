@@ -23,7 +23,7 @@ class Lane:
     @cached_property
     def outline(self) -> shapely.Polygon | shapely.MultiPolygon:
         """What lies within half the width of the way; its ends are straight."""
-        return shapely.LineString(self.way).buffer(self.width_m / 2.0, cap_style="flat", join_style="mitre")
+        return shapely.LineString(self.way).buffer(self.width_m / 2.0, cap_style="flat")
 
 
 @dataclass(frozen=True)

@@ -76,9 +76,11 @@ class GridSpec:
         return self.cell_m * self.cell_m
 
     def cells_of(self, x_m: FloatArray, y_m: FloatArray) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Rows and columns of the cells in which points of the mission frame lie, also beyond the grid."""
+        """Rows and columns of the cells in which points of the mission frame lie, also beyond the grid. An area may end
+        up to a cell beyond the centres of its map's last column: what lies there is held by that."""
         across_m, along_m = self.frame.to_sweep(x_m, y_m)
         rows, columns = np.floor(along_m / self.cell_m), np.rint(across_m / self.cell_m)
+        columns -= (columns == self.columns) & (across_m <= self.columns * self.cell_m)
         return rows.astype(np.intp), columns.astype(np.intp)
 
     def part(self, first_row: int, end_row: int, first_column: int, end_column: int) -> GridSpec:

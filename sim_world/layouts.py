@@ -102,7 +102,7 @@ class Clusters:
         _require(0.1 <= self.spread_m <= FARTHEST_APART_M, "spread_m", self.spread_m, "0.1 to 100000 m")
 
     def places(self, ground: Ground, count: int, generator: np.random.Generator) -> FloatArray:
-        """What of the clusters lies in the ground."""
+        """What of the clusters lies in the ground; evenly there, where they are so wide that next to nothing does."""
         middles = ground.uniform_points(self.count, generator)
 
         def draw(batch: int) -> FloatArray:
@@ -110,7 +110,10 @@ class Clusters:
             found: FloatArray = chosen + self.spread_m * generator.standard_normal((batch, 2))
             return found
 
-        return ground.points(count, draw)
+        try:
+            return ground.points(count, draw)
+        except ValueError:
+            return ground.uniform_points(count, generator)
 
 
 @dataclass(frozen=True)

@@ -47,7 +47,7 @@ class SonarModel(Protocol):
     ) -> FloatArray:
         """P_d, 0 to 0.999, of what lies at `position_m` (mission frame, true), seen at the range `range_m` >= 0 over
         the ground along the compass bearing `look_bearing_rad` from `altitude_m` above the seabed at `time_s`. The
-        arguments broadcast."""
+        arguments broadcast, and the answer does to their common shape."""
 
 
 class CurveSonar:
@@ -89,16 +89,19 @@ class CheckedSonar:
         position_m: Position,
         time_s: float,
     ) -> FloatArray:
-        """The model's answer. Raises ValueError, which names the model, where that is no array of P_d in the arguments'
-        common shape."""
+        """The model's answer, in the arguments' common shape. Raises ValueError, which names the model, where it is no
+        array of P_d, or does not broadcast to that shape."""
         answer = self._model.p_detect(range_m, look_bearing_rad, altitude_m, position_m, time_s)
         try:
             p_detect = np.asarray(answer, dtype=np.float64)
         except (TypeError, ValueError) as error:
             raise ValueError(f"{self._told} must answer with an array of P_d, not {answer!r}") from error
         shape = np.broadcast_shapes(*(np.shape(one) for one in (range_m, look_bearing_rad, *position_m)))
-        if p_detect.shape != shape:
-            raise ValueError(f"{self._told} answers in the shape {p_detect.shape} to what has the shape {shape}")
+        try:
+            p_detect = np.broadcast_to(p_detect, shape)
+        except ValueError as error:
+            answered = f"{self._told} answers in the shape {p_detect.shape} to what has the shape {shape}"
+            raise ValueError(answered) from error
         wrong = ~((p_detect >= 0.0) & (p_detect <= HIGHEST_P_DETECT))  # a NaN is not in order with any number
         if wrong.any():
             place_m, given = np.broadcast_to(range_m, shape)[wrong].flat[0], p_detect[wrong].flat[0]

@@ -10,6 +10,7 @@ from functools import lru_cache
 import numpy as np
 
 from planner.footprints.footprint import Reach
+from planner.risk import HIGHEST_P_DETECT
 from planner.types import EVERYWHERE, BoolArray, FloatArray, GridSpec, LookGeometry, SweepFrame, Track, Window
 
 EDGE_TOLERANCE_M = 1e-3
@@ -57,7 +58,8 @@ def over_cells(grid: GridSpec, geometry: LookGeometry, p_detect: FloatArray) -> 
         for many, one in ((total, p_detect), (count, seen)):
             many[..., bins:] += one[..., :-bins]
             many[..., :-bins] += one[..., bins:]
-    return np.where(seen, total / np.maximum(count, 1.0), 0.0)
+    mean = np.minimum(total / np.maximum(count, 1.0), HIGHEST_P_DETECT)  # of such it may be above by rounding
+    return np.where(seen, mean, 0.0)
 
 
 def _window(corners_m: list[float], centres_m: FloatArray) -> slice:

@@ -26,6 +26,7 @@ from secondlook.scenario.area import Priority, priority_grounds
 
 Cells = tuple[np.ndarray[tuple[int], np.dtype[np.intp]], np.ndarray[tuple[int], np.dtype[np.intp]]]
 """Rows and columns of cells."""
+OFF_ANY_GRID_M = 1e9
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,10 +67,12 @@ class RiskMap:
 
     def at(self, x_m: FloatArray | float, y_m: FloatArray | float) -> FloatArray:
         """The risk of the cells that hold these places (mission frame); NaN outside the grid, and for no place."""
-        across_m, along_m = self.grid.frame.to_sweep(np.asarray(x_m), np.asarray(y_m))
-        columns, rows = np.floor(across_m / self.grid.cell_m + 0.5), np.floor(along_m / self.grid.cell_m)
+        places = (
+            np.clip(np.nan_to_num(one, nan=OFF_ANY_GRID_M), -OFF_ANY_GRID_M, OFF_ANY_GRID_M) for one in (x_m, y_m)
+        )
+        rows, columns = self.grid.cells_of(*places)
         on_grid = (columns >= 0) & (columns < self.grid.columns) & (rows >= 0) & (rows < self.grid.rows)
-        row, column = (np.where(on_grid, places, 0).astype(int) for places in (rows, columns))
+        row, column = (np.where(on_grid, numbers, 0) for numbers in (rows, columns))
         return np.where(on_grid, self.risk[row, column], np.nan)
 
     def mean_within(self, geometry: BaseGeometry) -> float:

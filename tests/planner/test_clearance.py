@@ -246,8 +246,17 @@ def test_a_clearance_is_that_of_every_number_found_and_left(
     expected = sum(likely for of_all, likely in by_share.items() if of_all >= share - 1e-12)
     assert told.chance_of_clearance(share) == pytest.approx(expected, abs=1e-9)
     with_chance = told.clearance_with(chance)
+    assert with_chance == 0.0 or round(told.chance_of_clearance(with_chance), 9) >= chance
     assert sum(likely for of_all, likely in by_share.items() if of_all >= with_chance - 1e-8) >= chance - 2e-9
     assert sum(likely for of_all, likely in by_share.items() if of_all > with_chance + 1e-8) < chance + 2e-9
+
+
+def test_a_share_is_told_that_has_its_chance_also_where_it_is_rounded() -> None:
+    # One may be left of two found: two thirds, which is less than 0.666666667.
+    told = MinesLeft(0.1, 0, 1, 0.5, 0.9, np.array([0.5, 1.0]), np.ones(2))
+    assert told.clearance_with(0.9) == 0.666666666
+    assert told.chance_of_clearance(0.666666666) == 1.0
+    assert told.chance_of_clearance(0.666666667) == 0.5
 
 
 def test_of_many_objects_the_sum_of_their_chances_is_told() -> None:

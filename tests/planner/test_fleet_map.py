@@ -228,7 +228,7 @@ def test_what_was_seen_at_a_point_is_the_sum_of_all_levels_of_its_cell_and_nothi
     for place in PLACES:
         tile("alpha", (0, 1), place, 50).give(fleet)
     tile("beta", (0, 1), PLACES[0], 30).give(fleet)
-    x_m = np.array([0.0, -2.4, 50.0, 110.0, 112.4, -2.6, 112.6, 50.0, 50.0])
+    x_m = np.array([0.0, -2.4, 50.0, 110.0, 114.9, -2.6, 115.1, 50.0, 50.0])
     y_m = np.array([2.5, 0.1, 50.0, 109.9, 50.0, 50.0, 50.0, -0.1, 110.1])
     assert fleet.nats_at(x_m, y_m) == pytest.approx([1.6, 1.6, 1.6, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0])
 

@@ -127,6 +127,13 @@ def test_a_lane_between_the_centres_of_cells_is_as_large_as_it_is(width_m: float
     np.testing.assert_array_equal(place[:, 10], place[:, 11])  # centred 2.5 m to either side of its middle
 
 
+def test_a_lane_reaches_half_its_width_also_at_a_sharp_bend() -> None:
+    lane = Lane(((10.0, 50.0), (80.0, 50.0), (10.0, 51.0)), 20.0)
+    west, south, east, north = lane.outline.bounds
+    assert (east, south, north) == pytest.approx((90.0, 40.0, 61.0), abs=0.05)
+    assert west > 9.0
+
+
 @pytest.mark.parametrize(("clearance", "chance"), [(0.0, 0.5), (1.1, 0.5), (0.5, 0.0), (0.5, 1.0)])
 def test_what_makes_no_sense_is_refused(clearance: float, chance: float) -> None:
     with pytest.raises(ValueError, match="must be in"):

@@ -101,6 +101,12 @@ def test_clusters_are_as_many_and_as_wide_as_told() -> None:
     assert np.concatenate([one - one.mean(axis=0) for one in near]).std() == pytest.approx(20.0, rel=0.05)
 
 
+def test_clusters_far_wider_than_the_ground_lie_evenly_in_it() -> None:
+    places = laid(Clusters(2, 1e5), 3000, ground=Ground(((0.0, 0.0), (10.0, 0.0), (10.0, 40.0), (0.0, 40.0))))
+    assert places.mean(axis=0) == pytest.approx([5.0, 20.0], rel=0.05)
+    assert places.std(axis=0) == pytest.approx([10.0 / math.sqrt(12.0), 40.0 / math.sqrt(12.0)], rel=0.05)
+
+
 def test_places_that_are_given_are_taken_as_they_are() -> None:
     given_m = ((3.5, 4.0), (1.0, 2.25))
     truth = make_targets(TargetsConfig(2, Given(given_m)), SQUARE, 1).truth()

@@ -59,6 +59,13 @@ def test_an_answer_that_holds_no_numbers_is_refused(answer: object) -> None:
         CheckedSonar(Tells(), "primary").p_detect(RANGE_M, 0.0, 15, PLACE, 0)
 
 
+def test_an_answer_is_taken_for_all_that_share_it() -> None:
+    bearing_rad = np.array([[0.0], [1.0]])
+    answer = CheckedSonar(Answers(0.1, 0.5, 0.9), "primary").p_detect(RANGE_M, bearing_rad, 15, PLACE, 0)
+    assert answer.tolist() == [[0.1, 0.5, 0.9]] * 2
+    assert CheckedSonar(Answers(0.5), "primary").p_detect(RANGE_M, 0.0, 15, PLACE, 0).tolist() == [0.5] * 3
+
+
 def test_an_answer_of_another_shape_is_refused() -> None:
     with pytest.raises(ValueError, match=r"^the sonar model of primary, .* answers in the shape \(2,\) .* \(3,\)$"):
         CheckedSonar(Answers(0.5, 0.5), "primary").p_detect(RANGE_M, 0.0, 15, PLACE, 0)

@@ -100,8 +100,11 @@ def _answer(checked: Checked, plug_in: Any, question: tuple[Any, ...]) -> Any:
         p_detect = np.asarray(answer, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise AssertionError(f"{told} must answer with an array of P_d; {error}") from error
-    if p_detect.shape != shape:
-        raise AssertionError(f"{told} answers in the shape {p_detect.shape} to what has the shape {shape}")
+    try:
+        p_detect = np.broadcast_to(p_detect, shape)
+    except ValueError as error:
+        answered = f"{told} answers in the shape {p_detect.shape} to what has the shape {shape}"
+        raise AssertionError(answered) from error
     wrong = ~((p_detect >= 0.0) & (p_detect <= HIGHEST_P_DETECT))
     if wrong.any():
         place = np.broadcast_to(range_m, shape)[wrong].flat[0]

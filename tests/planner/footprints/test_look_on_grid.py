@@ -11,6 +11,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from planner.footprints.cells import EDGE_TOLERANCE_M, look_on_grid, over_cells
+from planner.risk import HIGHEST_P_DETECT
 from planner.types import FloatArray, GridSpec, LookGeometry, SweepFrame
 
 NORTH, EAST, SOUTH, WEST = (k * math.pi / 2 for k in range(4))
@@ -126,6 +127,13 @@ class TestByHand:
         finer, coarser = (look_at((10, 0), NORTH, (5, bin_m), (1, 13)) for bin_m in (0.1, 5.0))
         assert over_cells(self.GRID, finer, look)[1, 0, 4:] == pytest.approx([0.5] * 9)
         assert (over_cells(self.GRID, coarser, look) == look).all()
+
+    @pytest.mark.parametrize("bins", range(1, 60))
+    def test_the_mean_of_the_highest_p_detect_is_no_higher(self, bins: int) -> None:
+        look = np.full((2, 1, 80), HIGHEST_P_DETECT)
+        mean = over_cells(self.GRID, look_at((10, 0), NORTH, (5, 5 / bins), (1, 80)), look)
+        assert mean.max() <= HIGHEST_P_DETECT
+        assert mean == pytest.approx(look)
 
     def test_halfway_between_two_range_bins_the_outer_one_counts(self) -> None:
         # Cells are 2.5, 7.5 and 12.5 m away: bins 1, 2 and 3.

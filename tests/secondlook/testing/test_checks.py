@@ -402,11 +402,11 @@ class Loud(Sonar):
         return p_detect * 3
 
 
-class Flat(Sonar):
-    """Answers with one number."""
+class Longer(Sonar):
+    """Answers with one number too many."""
 
     def spoil(self, p_detect: Any, time_s: float) -> Any:
-        return float(np.mean(p_detect))
+        return np.append(p_detect, 0.5)
 
 
 class Silent(Sonar):
@@ -439,7 +439,7 @@ class Meddling(CurveSonar):
             r"Blind, at 30000 s from \d+ m above the seabed, gives a P_d of nan at a range of \d+ m; must be",
         ),
         (Loud, r"Loud, at .* gives a P_d of [12]\.\d+ at a range of \d+ m; must be 0 to 0.999"),
-        (Flat, r"Flat, at .* answers in the shape \(\) to what has the shape \("),
+        (Longer, r"Longer, at .* answers in the shape \(\d+,\) to what has the shape \("),
         (Silent, r"Silent, at .* must answer with an array of P_d; "),
         (Noisy, r"Noisy answers otherwise when it (is asked again|was asked nothing else before)"),
         (Meddling, r"Meddling, at .* has changed what it was given"),
