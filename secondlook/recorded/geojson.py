@@ -180,14 +180,20 @@ def drawn(geometry: BaseGeometry, origin: GeographicOrigin | None) -> dict[str, 
 
 
 def _cut_at_the_antimeridian(geometry: BaseGeometry) -> BaseGeometry:
-    west, _, east, _ = geometry.bounds
-    if west >= -180 and east <= 180:
+    """A geometry within -180 and 180 degrees; of what only touches the antimeridian nothing lies on its other side."""
+    west, _, east, _ = np.round(geometry.bounds, DEGREE_DECIMALS)
+    turns = (west + 180.0) // 360.0
+    geometry = _turned_back(geometry, turns)
+    if east - 360.0 * turns <= 180.0:
         return geometry
-    pieces = [_moved_into_range(geometry, turn_deg) for turn_deg in (-360.0, 0.0, 360.0)]
-    return shapely.union_all(pieces)
+    pieces = []
+    for turn in (0, 1):
+        there = shapely.box(360 * turn - 180, -90, 360 * turn + 180, 90)
+        pieces.append(_turned_back(shapely.intersection(geometry, there), turn))
+    parts = shapely.get_parts(pieces)
+    # A side on the antimeridian is in both: of the one as a line, which is no part of an area.
+    return shapely.union_all(parts[shapely.get_dimensions(parts) == shapely.get_dimensions(geometry)])
 
 
-def _moved_into_range(geometry: BaseGeometry, turn_deg: float) -> BaseGeometry:
-    """The part of a geometry that lies a turn away, brought back."""
-    there = shapely.box(turn_deg - 180, -90, turn_deg + 180, 90)
-    return shapely.transform(shapely.intersection(geometry, there), lambda places: places - [turn_deg, 0.0])
+def _turned_back(geometry: BaseGeometry, turns: float) -> BaseGeometry:
+    return shapely.transform(geometry, lambda places: places - [360.0 * turns, 0.0])

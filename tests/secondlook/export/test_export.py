@@ -238,6 +238,15 @@ def test_without_an_origin_it_asks_for_one(
     assert capsys.readouterr().err == said
 
 
+def test_ground_that_touches_the_antimeridian_is_exported_whole(
+    brief_run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert command(monkeypatch, str(brief_run), "--origin", "60", "180", "--out", str(tmp_path)) == 0
+    ((area, _),) = features(tmp_path / "mission.kml", "areas")
+    assert isinstance(area, shapely.Polygon)
+    assert area.bounds[:2] == pytest.approx((-180, 60), abs=2e-7)
+
+
 def test_without_rasterio_it_says_what_is_left_out(
     charted_run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

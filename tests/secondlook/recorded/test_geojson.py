@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 import shapely
 from shapely.geometry import shape
+from shapely.geometry.base import BaseGeometry
 
 import secondlook
 from secondlook import cli
@@ -90,6 +91,31 @@ def test_what_crosses_the_antimeridian_is_cut_there() -> None:
     assert drawn(shapely.LineString([(-500, 0), (500, 0)]), here)["type"] == "MultiLineString"
     assert shape(drawn(shapely.box(200, 0, 500, 300), here)).bounds[2] < -179.99
     assert shape(drawn(shapely.box(-500, 0, 0, 300), here)).bounds[0] > 179.99
+
+
+@pytest.mark.parametrize("longitude_deg", [180.0, -180.0])
+@pytest.mark.parametrize(
+    "geometry",
+    [
+        shapely.box(0, 0, 300, 100),
+        shapely.box(-300, 0, 0, 100),
+        shapely.LineString([(0, 0), (0, 50), (50, 50)]),
+        shapely.LineString([(-50, 0), (0, 25), (-50, 50)]),
+        shapely.LineString([(9, 9), (9, 9)]),  # of a vehicle that stands still
+    ],
+)
+def test_what_touches_the_antimeridian_is_not_cut(geometry: BaseGeometry, longitude_deg: float) -> None:
+    there = drawn(geometry, GeographicOrigin(60.0, longitude_deg))
+    assert there["type"] == geometry.geom_type
+    assert shapely.get_num_coordinates(shape(there)) == shapely.get_num_coordinates(geometry)
+
+
+def test_a_side_on_the_antimeridian_is_drawn_once() -> None:
+    corners = [(-300, 0), (300, 0), (300, 50), (0, 50), (0, 100), (-300, 100)]
+    halves = drawn(shapely.Polygon(corners), GeographicOrigin(60.0, 180.0))
+    assert (halves["type"], len(halves["coordinates"])) == ("MultiPolygon", 2)
+    way = drawn(shapely.LineString([(-50, 0), (50, 25), (0, 50), (50, 75)]), GeographicOrigin(60.0, 180.0))
+    assert way["type"] == "MultiLineString"
 
 
 def test_the_scenario_may_hold_the_origin(write: Callable[[str], str], valid_text: str, brief_copy: Path) -> None:
