@@ -46,7 +46,7 @@ class GeographicOrigin:
         Longitudes go on beyond 180 degrees where the mission crosses the antimeridian.
         """
         longitude_deg, latitude_deg = _projection(self)(np.array(x_m, float), np.array(y_m, float), inverse=True)
-        return self.longitude_deg + (longitude_deg - self.longitude_deg + 180) % 360 - 180, latitude_deg
+        return longitudes_about(self.longitude_deg, longitude_deg), latitude_deg
 
     def to_metres(
         self, longitude_deg: FloatArray | float, latitude_deg: FloatArray | float
@@ -54,6 +54,11 @@ class GeographicOrigin:
         """X and y in the mission frame of places on Earth, by longitude and latitude; the inverse of `to_degrees`."""
         x_m, y_m = _projection(self)(np.array(longitude_deg, float), np.array(latitude_deg, float))
         return x_m, y_m
+
+
+def longitudes_about(middle_deg: float, longitude_deg: FloatArray) -> FloatArray:
+    """Longitudes, by whole turns within 180 degrees of one: across the antimeridian they go on beyond 180."""
+    return longitude_deg + 360.0 * np.round((middle_deg - longitude_deg) / 360.0)
 
 
 @lru_cache(maxsize=8)

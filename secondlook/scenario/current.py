@@ -14,7 +14,7 @@ from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator
 
 from planner.currents import FlowGrid
 from planner.types import FloatArray, Point
-from secondlook.geography import GeographicOrigin
+from secondlook.geography import GeographicOrigin, longitudes_about
 from secondlook.scenario.table import (
     IN_DEGREES,
     PLACE_LIMITS,
@@ -168,9 +168,10 @@ class FlowTable:
 
         A grid in degrees lies a little askew in that frame: the flow is taken at as many places of one in metres.
         """
-        grid = FlowGrid(self.east, self.north, self.time_s, self.east_mps, self.north_mps)
         east, north, flows_mps = self.east, self.north, np.stack([self.east_mps, self.north_mps])
         if origin is not None:
+            east, order = np.unique(longitudes_about(origin.longitude_deg, east), return_index=True)
+            grid = FlowGrid(east, north, self.time_s, *flows_mps[..., order])
             x_m, y_m = origin.to_metres(*np.meshgrid(east, north))
             east, north = (np.linspace(one.min(), one.max(), one.shape[axis]) for one, axis in ((x_m, 1), (y_m, 0)))
             flows_mps = grid.flows_mps(*origin.to_degrees(*np.meshgrid(east, north)))

@@ -82,6 +82,23 @@ def test_degrees_become_metres_about_the_origin(load: Callable[..., Scenario]) -
         assert grid.flow_mps(0.0, (x_m, y_m)) == pytest.approx(expected, abs=2e-4)
 
 
+@pytest.mark.parametrize("origin_deg", [179.995, -179.995])
+def test_a_table_across_the_antimeridian_is_as_one_elsewhere(load: Callable[..., Scenario], origin_deg: float) -> None:
+    def about(middle_deg: float, at_deg: float) -> GridCurrent:
+        rows = [
+            f"{(middle_deg + offset_deg + 180) % 360 - 180:.6f},{latitude_deg},{east_mps},0"
+            for latitude_deg in (9.99, 10.02)
+            for offset_deg, east_mps in ((-0.02, 0.1), (-0.01, 0.1), (0, 0.5), (0.01, 0.9), (0.02, 0.9))
+        ]
+        place = f"origin: {{latitude_deg: 10, longitude_deg: {at_deg}}}\n"
+        return current_of(load("longitude_deg,latitude_deg,east_mps,north_mps\n" + "\n".join(rows), before=place))
+
+    there, twin = about(180, origin_deg), about(10, origin_deg % 360 - 170)
+    assert len(set(twin.east_mps)) > 2
+    assert there.east_mps == pytest.approx(twin.east_mps, abs=2e-4)
+    assert there.x_m == pytest.approx(twin.x_m, abs=0.002)
+
+
 ALLOWED = "east_mps, north_mps, x_m and y_m or longitude_deg and latitude_deg, and time_s or not"
 NODE = "must have every place of a regular grid, at every time"
 MISTAKES: dict[str, tuple[str | bytes, str]] = {
