@@ -9,12 +9,15 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
 import typer
 
+from planner.types import FloatArray
 from secondlook.commands.planned_survey import planned_surveys
 from secondlook.commands.run import expected_of
 from secondlook.errors import UserError
 from secondlook.files import CannotWriteError, write_whole
+from secondlook.geography import longitudes_about
 from secondlook.scenario import Scenario, make_scenario
 from secondlook.scenario.bundled import scenario_text
 from secondlook.scenario.chart import Chart, ChartError, ChartStart, Ring, read_chart
@@ -85,9 +88,14 @@ def scenario_of(chart: Chart, source: Path) -> tuple[str, Scenario]:
 
 def _about_m2(ring: Ring) -> float:
     """The size of the rectangle about a ring, to a few per cent."""
-    latitudes_deg, longitudes_deg = zip(*ring, strict=True)
-    high_deg, wide_deg = max(latitudes_deg) - min(latitudes_deg), max(longitudes_deg) - min(longitudes_deg)
-    return float(high_deg * wide_deg * 111_000**2 * math.cos(math.radians(latitudes_deg[0])))
+    high_deg, wide_deg = np.ptp(_whole(ring), axis=0)
+    return float(high_deg * wide_deg * 111_000**2 * math.cos(math.radians(ring[0][0])))
+
+
+def _whole(ring: Ring) -> FloatArray:
+    """Latitudes and longitudes of a ring, shape (corners, 2); across the antimeridian longitudes go on beyond 180."""
+    latitudes_deg, longitudes_deg = np.transpose(ring)
+    return np.column_stack([latitudes_deg, longitudes_about(longitudes_deg[0], longitudes_deg)])
 
 
 def _loaded(text: str) -> Scenario:
@@ -99,7 +107,8 @@ def _text(chart: Chart, source: Path, cell_m: int, limit_s: int) -> str:
     units = pattern[pattern.index("# Lengths in metres") : pattern.index("name:")]
     rest = pattern[pattern.index("mission:") :]
     name = _NO_ID.sub("-", source.stem.lower()).strip("-")[:40] or "chart"
-    origin = (_floor(min(place[0] for place in chart.area)), _floor(min(place[1] for place in chart.area)))
+    south_deg, west_deg = map(_floor, _whole(chart.area).min(axis=0))
+    origin = south_deg, (west_deg + 180) % 360 - 180
     lines = [
         f"# Made from {''.join(char for char in source.name if char.isprintable())} by secondlook new.",
         f"# Vehicles, sonars and times are such as in the bundled scenario {PATTERN}: put yours in their place.",

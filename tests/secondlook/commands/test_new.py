@@ -196,6 +196,21 @@ def test_without_starts_there_are_two_vehicles_by_the_corner(
     assert scenario.mission.time_limit_s > 20_000
 
 
+@pytest.mark.parametrize("first", [0, 1])
+def test_ground_across_the_antimeridian_is_as_its_twin_elsewhere(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, first: int
+) -> None:
+    for name, west_deg, east_deg in (("there", 179.99537, -179.99537), ("twin", 9.99537, 10.00463)):
+        ring = [(west_deg, 10.0), (east_deg, 10.0), (east_deg, 10.005), (west_deg, 10.005)]
+        draw(polygon([*ring[first:], *ring[:first]]))
+        assert command(monkeypatch, "new", "bay.geojson", "--out", f"{name}.yaml") == 0
+    there, twin = load_scenario("there.yaml"), load_scenario("twin.yaml")
+    assert there.origin is not None
+    assert (there.origin.latitude_deg, there.origin.longitude_deg) == (10, 179.9953)
+    assert (there.area.cell_m, there.mission) == (5, twin.mission)
+    assert np.array(there.area.polygon_m) == pytest.approx(np.array(twin.area.polygon_m), abs=0.002)
+
+
 def test_what_keeps_the_mission_from_its_end_is_told_with_the_key_to_change(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
