@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ LARGEST_CHART_BYTES = 10_000_000
 USUAL_WEIGHT = 3.0
 ROLES = ("area", "hole", "keep_out", "priority", "start")
 _ROLE_KEYS = ("role", "kind", "name", "title")
+_NUMBER_KEYS = {"weight", "heading_deg"}
 _ROLE = re.compile(rf"({'|'.join(ROLES).replace('_', '[ _-]?')})s?(?![a-z])[\s_:-]*(.*)", re.DOTALL)
 _WGS84 = re.compile(r".*(crs84|epsg:+(4326|4979))", re.IGNORECASE)
 _EPSG = re.compile(r".*epsg:+(?:[0-9.]*:)?([0-9]{1,6})", re.IGNORECASE)
@@ -169,14 +171,13 @@ def _kml(content: bytes) -> dict[str, Any]:
 
 
 def _kml_properties(placemark: ElementTree.Element) -> dict[str, Any]:
-    found: dict[str, Any] = {}
+    found: dict[str, Any] = {"name": (placemark.findtext("{*}name") or "").strip()}
     for one in (*placemark.iterfind(".//{*}Data"), *placemark.iterfind(".//{*}SimpleData")):
-        text = (one.findtext("{*}value") or one.text or "").strip()
-        try:
-            found[one.get("name", "")] = float(text)
-        except ValueError:
-            found[one.get("name", "")] = text
-    return {"name": (placemark.findtext("{*}name") or "").strip(), **found}
+        found[one.get("name", "")] = (one.findtext("{*}value") or one.text or "").strip()
+    for key in _NUMBER_KEYS & found.keys():
+        with suppress(ValueError):
+            found[key] = float(found[key])
+    return found
 
 
 def _kml_geometry(placemark: ElementTree.Element) -> dict[str, Any] | None:

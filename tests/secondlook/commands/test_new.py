@@ -142,6 +142,19 @@ def test_a_chart_in_kml_is_the_same_one(folder: Path) -> None:
     assert read_chart(folder / "bay.kml") == read_chart(folder / "bay.geojson")
 
 
+@pytest.mark.parametrize("vehicle", ["007", "1e5", "Infinity", "0"])
+def test_a_vehicle_in_kml_is_called_what_it_is_called(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, vehicle: str
+) -> None:
+    area = f"<name>Area</name><Polygon>{kml_ring(L_SHAPE)}</Polygon>"
+    where = "<Point><coordinates>10.4995,59.8795</coordinates></Point>"
+    first, second = (f"{extended(role='start', vehicle=one, heading_deg=90)}{where}" for one in ("primary", vehicle))
+    Path("bay.kml").write_bytes(kml(area, first, second))
+    assert read_chart(folder / "bay.kml").starts[1] == ChartStart(vehicle, (59.8795, 10.4995), 90.0)
+    assert command(monkeypatch, "new", "bay.kml", "--out", "bay.yaml") == 0
+    assert list(load_scenario("bay.yaml").vehicles) == ["primary", vehicle.lower()]
+
+
 @pytest.fixture
 def made(folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Scenario:
     draw(BAY)
