@@ -178,17 +178,21 @@ class Mission(ABC):
 
     def mines_left(self, within: BaseGeometry | None = None) -> MinesLeft | None:
         """How many mines may be left in the area at the end, or in what of it lies within a geometry (mission frame),
-        as a lane: `shapely.LineString(way).buffer(width_m / 2)`. None where nothing was seen.
+        as a lane: `shapely.LineString(way).buffer(width_m / 2, cap_style="flat")`. None where nothing was seen.
 
         Each cell of the map counts by the share of it that lies there; so the whole area counts for a little more than
         without `within`, where cells count whose middle lies in it. All that was found, wherever, tells how dense mines
-        lie. Raises UserError where nothing of the area lies there, and for what is no geometry or not a valid one.
+        lie. Raises UserError where nothing of the area lies there, and for what is no geometry, not a valid one or one
+        without an area.
         """
         if within is None:
             return self._figures.mines_left()
         check_geometry("within", within)
         if not within.is_valid:
             raise UserError(f"within: must be a valid geometry, but: {shapely.is_valid_reason(within)}")
+        if within.area == 0.0:
+            told = f"within: a {within.geom_type} without an area is not allowed"
+            raise UserError(f'{told}; must be a polygon, such as line.buffer(width_m / 2, cap_style="flat")')
         place = self._region.shares(within, self.run.grid.spec)
         if not place.any():
             raise UserError("within: nothing of the area lies there; must be a polygon in the mission frame")
