@@ -10,6 +10,7 @@ import typer
 from secondlook.commands.planned_survey import planned_surveys, unreachable
 from secondlook.commands.run import expected_of, refuse, tell_expected
 from secondlook.commands.scenarios import names_beginning_with
+from secondlook.errors import FAILED
 from secondlook.preflight.goal import goal_estimate
 from secondlook.progress import no_remark, shown_progress
 from secondlook.scenario import load_scenario
@@ -46,3 +47,5 @@ def check(
     with shown_progress("trying the goal", "of the missions flown") as tell:
         estimate = goal_estimate(valid, lambda share: tell(share, no_remark))
     typer.echo(estimate.sentence, err=estimate.is_doubtful)
+    if estimate.has_failed:
+        raise typer.Exit(FAILED)

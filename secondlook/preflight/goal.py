@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from comms.said.announcement import LARGEST_SEED
 from secondlook.errors import UserError
 from secondlook.launch.mission import check_bodies, run_in_passing
-from secondlook.launch.processes import RunFailedError
+from secondlook.launch.processes import RunFailedError, RunInterruptedError
 from secondlook.progress import in_seconds
 from secondlook.scenario import Scenario
 
@@ -18,12 +18,14 @@ FLIGHTS = 3
 @dataclass(frozen=True)
 class GoalEstimate:
     """`wanted`: in words. `reached_s`: when each mission flown ended that reached it. `missed`: how far each was that
-    did not. `why_not`: what kept them from being flown, empty where nothing did."""
+    did not. `why_not`: what kept them from being flown, empty where nothing did. `has_failed`: whether
+    that is a mission that has failed."""
 
     wanted: str
     reached_s: tuple[float, ...]
     missed: tuple[str, ...]
     why_not: str = ""
+    has_failed: bool = False
 
     @property
     def is_doubtful(self) -> bool:
@@ -43,7 +45,8 @@ class GoalEstimate:
 
 
 def goal_estimate(scenario: Scenario, progress: Callable[[float], None]) -> GoalEstimate:
-    """Of a mission that has a goal. `progress`: told the share that is flown."""
+    """Of a mission that has a goal. `progress`: told the share that is flown. Raises KeyboardInterrupt if it is
+    interrupted."""
     assert scenario.mission.goal is not None
     wanted, reached_s, missed = scenario.mission.goal.goal.words, list[float](), list[str]()
     try:
@@ -56,6 +59,8 @@ def goal_estimate(scenario: Scenario, progress: Callable[[float], None]) -> Goal
             else:
                 missed.append(summary["goal"]["now"])
             progress(number / FLIGHTS)
+    except RunInterruptedError as error:  # that is for who tries it, not one more failed mission
+        raise KeyboardInterrupt(str(error)) from None
     except (RunFailedError, UserError) as error:
-        return GoalEstimate(wanted, (), (), str(error))
+        return GoalEstimate(wanted, (), (), str(error), isinstance(error, RunFailedError))
     return GoalEstimate(wanted, tuple(reached_s), tuple(missed))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -123,6 +124,37 @@ def test_check_flies_it_to_see_whether_it_is_reached(called: Call) -> None:
     assert err.startswith(
         "mission.goal: no mine left with a chance of 0.99 is reached in 0 of 3 missions flown to try it; missed: the "
     )
+
+
+OWN = """
+import os, signal
+
+class Clueless:
+    def assign(self, situation):
+        raise RuntimeError("no idea")
+
+class Hit:
+    def assign(self, situation):
+        os.kill(os.getpid(), signal.SIGTERM)
+        return {}
+"""
+
+
+@pytest.mark.parametrize(
+    ("allocator", "code", "told"),
+    [
+        ("own:Clueless", 1, r"mission\.goal: .* is not known: coordinator has failed at .* RuntimeError: no idea .*\n"),
+        ("own:Hit", 130, ""),
+    ],
+    ids=["failed", "interrupted"],
+)
+def test_a_trial_that_fails_or_is_interrupted_is_no_success(
+    called: Call, users_folder: Path, allocator: str, code: int, told: str
+) -> None:
+    (users_folder / "own.py").write_text(OWN)
+    ended = called("check", str(BRIEF), "--set", ALL, "--set", f"coordinator.allocator={allocator}")
+    assert ended.code == code
+    assert re.fullmatch(told, ended.err)
 
 
 def test_strips_that_are_open_when_the_goal_is_reached_are_not_lost(tmp_path: Path) -> None:
