@@ -145,7 +145,7 @@ def expected_mission(scenario: Scenario) -> MissionExpectation:
     if survey_s <= limit_s < latest_s:
         remarks.append(
             f"mission.time_limit_s: {in_seconds(limit_s)} ends the mission if strips are left then, as a failure; its "
-            f"deadline is after about {in_seconds(latest_s)}"
+            f"deadline is after about {in_seconds(math.ceil(latest_s))}"
         )
     return MissionExpectation(
         surveys=surveys,
@@ -213,8 +213,8 @@ def _too_late(scenario: Scenario, surveys: Sequence[ExpectedSurvey], survey_s: f
         done = sum(end_s <= limit_s for one in surveys for end_s in one.ends_s)
         yield (
             f"mission.{key}: {in_seconds(limit_s)} ends the survey after about {done} of "
-            f"{_tracks(sum(one.tracks for one in surveys))}, as it takes about {in_seconds(survey_s)}; must be larger "
-            f"by about {in_seconds(survey_s - limit_s)}, {OR_ANYWAY}"
+            f"{_tracks(sum(one.tracks for one in surveys))}, as it takes about {in_seconds(math.ceil(survey_s))}; "
+            f"{_too_small(limit_s, survey_s)}"
         )
 
 
@@ -238,10 +238,14 @@ def _flown_too_far(
     if left_s <= spare_s:
         return [], [f"{sentence}; other primaries have the time to take the rest" for sentence in told]
     return [
-        f"{sentence}; must be larger by about {in_seconds(one.needs_s - scenario.vehicles[one.vehicle].endurance_s)}, "
-        f"{OR_ANYWAY}"
+        f"{sentence}; {_too_small(scenario.vehicles[one.vehicle].endurance_s, one.needs_s)}"
         for sentence, one in zip(told, short, strict=True)
     ], []
+
+
+def _too_small(given_s: float, needs_s: float) -> str:
+    """By how much a limit must be larger, which is rounded so that it is enough."""
+    return f"must be larger by about {in_seconds(math.ceil(needs_s) - math.floor(given_s))}, {OR_ANYWAY}"
 
 
 def _surveyed_twice(scenario: Scenario) -> Iterator[str]:

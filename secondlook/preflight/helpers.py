@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import shapely
 from shapely.geometry.base import BaseGeometry
 
@@ -43,13 +45,13 @@ def _out_of_reach(scenario: Scenario, vehicle: RevisitVehicle, area: BaseGeometr
     least_s, lasts_s = (out_m + strip_m + back_m) / fastest_mps, vehicle.endurance_s - vehicle.kept_s - MARGIN_S
     if least_s > lasts_s:
         return (
-            f"it needs {in_seconds(least_s)} or more for the shortest strip, the way there ({out_m:.0f} m) and home "
-            f"({back_m:.0f} m), and its endurance_s of {vehicle.endurance_s:g} is for {max(0.0, lasts_s):.0f} s beside "
-            "its reserve"
+            f"it needs {in_seconds(math.ceil(least_s))} or more for the shortest strip, the way there ({out_m:.0f} m) "
+            f"and home ({back_m:.0f} m), and its endurance_s of {vehicle.endurance_s:g} is for "
+            f"{max(0, math.floor(lasts_s))} s beside its reserve"
         )
     if out_m / fastest_mps >= until_s:
         return (
-            f"it needs {in_seconds(out_m / fastest_mps)} or more to the area, and the mission is over after "
+            f"it needs {in_seconds(math.ceil(out_m / fastest_mps))} or more to the area, and the mission is over after "
             f"{in_seconds(until_s)} at the latest"
         )
     return ""

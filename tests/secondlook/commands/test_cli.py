@@ -104,8 +104,8 @@ def test_what_cannot_end_within_its_limits_is_refused_in_one_sentence_and_flown_
 ) -> None:
     limit = ("--set", "mission.time_limit_s=60")
     told = re.compile(
-        r"mission\.time_limit_s: 60 s ends the survey after about 2 of 4 tracks, as it takes about 106 s; must be "
-        r"larger by about 46 s, or flown with --anyway\n"
+        r"mission\.time_limit_s: 60 s ends the survey after about 2 of 4 tracks, as it takes about 107 s; must be "
+        r"larger by about 47 s, or flown with --anyway\n"
     )
     code, out, err = called("check", str(BRIEF), *limit)
     assert code == 2

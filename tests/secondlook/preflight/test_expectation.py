@@ -165,8 +165,23 @@ def test_a_limit_is_told_with_what_it_cuts_and_by_how_much(key: str, limit_s: in
     (told,) = two_tracks(**changes).refusals
     assert told == (
         f"mission.{key}: {limit_s} s ends the survey after about {limit_s // 210} of 2 tracks, as it takes about "
-        f"461 s; must be larger by about {461 - limit_s} s, or flown with --anyway"
+        f"462 s; must be larger by about {462 - limit_s} s, or flown with --anyway"
     )
+
+
+@pytest.mark.parametrize("key", ["mission.time_limit_s", "mission.deadline_s", "vehicles.primary.endurance_s"])
+@pytest.mark.parametrize("given_s", [50, 60.4, 70.6])
+def test_a_limit_that_is_larger_by_what_is_told_is_refused_no_more(key: str, given_s: float) -> None:
+    alone = ["mission.deadline_factor=null"] if key == "mission.deadline_s" else []
+
+    def refusals(value_s: float) -> tuple[str, ...]:
+        return check_mission(BRIEF, [*alone, f"{key}={value_s}"]).refusals
+
+    (told,) = refusals(given_s)
+    told_s, lacking_s = (int(re.findall(pattern, told)[0]) for pattern in (rf"{key}: (\d+) s", r"by about (\d+) s"))
+    assert refusals(told_s + lacking_s) == refusals(given_s + lacking_s) == ()
+    (still,) = refusals(math.floor(given_s) + lacking_s - 1)
+    assert "must be larger by about 1 s" in still
 
 
 class TestBatteries:
@@ -179,7 +194,7 @@ class TestBatteries:
         lacking_s = survey.needs_s - 500
         assert told == (
             "vehicles.primary.endurance_s: 500 s ends its survey after about 0 of 2 tracks, as it must come home; must "
-            f"be larger by about {lacking_s:.0f} s, or flown with --anyway"
+            f"be larger by about {math.ceil(lacking_s)} s, or flown with --anyway"
         )
         assert two_tracks(**{"vehicles.primary.endurance_s": math.ceil(survey.needs_s) + 1}).refusals == ()
         assert two_tracks(**{"vehicles.primary.endurance_s": math.floor(survey.needs_s) - 1}).refusals != ()
@@ -257,12 +272,12 @@ WALLS = f"area.keep_out_m={list(_RING)}"
         (
             # Its sonar sees 15 m: 1,000 m there, 30 m of strip and 1,000 m home at 12 m/s.
             ["vehicles.helper.start={x_m: -1015, y_m: 50}", "vehicles.helper.endurance_s=180"],
-            "it needs 169 s or more for the shortest strip, the way there (1000 m) and home (1000 m), and its "
+            "it needs 170 s or more for the shortest strip, the way there (1000 m) and home (1000 m), and its "
             "endurance_s of 180 is for 152 s beside its reserve",
         ),
         (
             ["vehicles.helper.start={x_m: -4015, y_m: 50}"],
-            "it needs 333 s or more to the area, and the mission is over after {latest_s:.0f} s at the latest",
+            "it needs 334 s or more to the area, and the mission is over after {latest_s:.0f} s at the latest",
         ),
     ],
 )
@@ -316,7 +331,7 @@ def test_a_time_limit_between_the_surveys_end_and_the_deadline_is_remarked_on(tm
     assert expected.refusals == ()
     assert expected.warnings == [
         "mission.time_limit_s: 3300 s ends the mission if strips are left then, as a failure; its deadline is after "
-        f"about {expected.latest_s:.0f} s"
+        f"about {math.ceil(expected.latest_s)} s"
     ]
 
 
