@@ -5,6 +5,7 @@ Imports nothing of the project before a fixture is used: every pytest run where 
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -109,7 +110,7 @@ class Storm:
         if outcome.violations:
             self._file.write_text(self.plan.to_yaml(), encoding="utf-8")
             found = "\n".join(str(one) for one in outcome.violations)
-            again = f"secondlook storm --plan {self._file}"
+            again = f"secondlook storm --plan {shlex.quote(str(self._file))}"
             pytest.fail(f"{found}\nagain: {again}\nmade small: {again} --shrink", pytrace=False)
         return outcome
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import shlex
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -60,9 +61,8 @@ def new(
     across_m, along_m = scenario.area.extent_m
     assert scenario.origin is not None
     place = f"latitude {scenario.origin.latitude_deg:g}, longitude {scenario.origin.longitude_deg:g}"
-    typer.echo(
-        f"{out}: {across_m:.0f} m by {along_m:.0f} m from {place}; secondlook check {out} tells how it is surveyed"
-    )
+    check = f"secondlook check {shlex.quote(str(out))}"
+    typer.echo(f"{out}: {across_m:.0f} m by {along_m:.0f} m from {place}; {check} tells how it is surveyed")
     _tell(out, refusals)
 
 

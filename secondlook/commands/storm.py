@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 import sys
 from collections.abc import Sequence
 from contextlib import closing
@@ -107,7 +108,8 @@ def storm(
     elif canaries:
         _look_for_canaries(mission, _range_of(seeds or "1..500"), jobs or os.cpu_count() or 1, out)
     else:
-        _fly_many(mission, scenario, _range_of(seeds or "1..100"), again, jobs or os.cpu_count() or 1, out)
+        words = [*filter(None, [scenario]), *(word for one in set_ or () for word in ("--set", one))]
+        _fly_many(mission, words, _range_of(seeds or "1..100"), again, jobs or os.cpu_count() or 1, out)
 
 
 def _range_of(seeds: str) -> range:
@@ -131,7 +133,8 @@ def _fly_one(plan: TroublePlan, folder: Path, bus: Bus, flights: int) -> None:
         typer.echo(f"All that must hold does; the mission {how} at {outcome.end_s:.0f} s.")
     typer.echo(f"Files: {folder}, the plan file plan.yaml among them")
     if outcome.violations:
-        typer.echo(f"The moment: secondlook view {latest_flight(folder)} --at {outcome.violations[0].t_s:g}")
+        flown = shlex.quote(str(latest_flight(folder)))
+        typer.echo(f"The moment: secondlook view {flown} --at {outcome.violations[0].t_s:g}")
         raise typer.Exit(FAILED)
 
 
@@ -177,12 +180,13 @@ def _shrunk(plan: TroublePlan, folder: Path, bus: Bus, flights: int) -> TroubleP
 
 
 def _fly_many(
-    mission: Scenario | None, named: str | None, numbers: range, twice: int, jobs: int, out: Path | None
+    mission: Scenario | None, words: Sequence[str], numbers: range, twice: int, jobs: int, out: Path | None
 ) -> None:
+    """`words`: by which the command is told whose storms to fly."""
     if out is not None:
         make_folder(out)
     outcomes: Outcomes = {}
-    again = " ".join(["secondlook storm", *([named] if named else []), "--seed"])
+    again = shlex.join(["secondlook", "storm", *words, "--seed"])
 
     def fly(tell: Tell) -> None:
         def progress(number: int, outcome: Outcome) -> None:

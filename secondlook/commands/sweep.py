@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -77,7 +78,7 @@ def sweep(
 
     failure = fly_watched("sweep", "missions", missions, fly, shown=True)
     _show(out, names, page=False)
-    typer.echo(f"Files: {out}; how it stands: secondlook sweep {out} --show")
+    typer.echo(f"Files: {out}; how it stands: secondlook sweep {shlex.quote(str(out))} --show")
     if failure:
         sys.stderr.write(f"{failure}; the same command goes on\n")
     if failed or failure:

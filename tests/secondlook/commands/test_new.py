@@ -190,6 +190,14 @@ def test_the_scenario_that_is_made_passes_and_flies(
     assert json.loads((folder / "run" / "summary.json").read_text())["ending"] == "over"
 
 
+def test_the_command_that_checks_it_is_told_as_a_shell_takes_it(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    draw(BAY)
+    assert command(monkeypatch, "new", "bay.geojson", "--out", "my bay.yaml") == 0
+    assert capsys.readouterr().out.endswith("; secondlook check 'my bay.yaml' tells how it is surveyed\n")
+
+
 def test_without_starts_there_are_two_vehicles_by_the_corner(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import json
+import re
 import resource
+import shlex
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
 
 import pytest
+from called import Call
+from flights import BRIEF
 from typer.testing import CliRunner
 
 import secondlook
@@ -273,3 +278,24 @@ def test_the_command_flies_many_and_one(tmp_path: Path) -> None:
     assert one.exit_code == 0, one.output
     assert load_plan(tmp_path / "o" / "plan.yaml") == storm_of(None, QUICK)
     assert (tmp_path / "o" / "flight-1" / "mission.rrd").is_file()
+
+
+TIRED = """
+class Tired:
+    def assign(self, situation):
+        raise RuntimeError("tired")
+"""
+
+
+def test_the_command_that_is_told_flies_that_storm_again(users_folder: Path, called: Call) -> None:
+    (users_folder / "own.py").write_text(TIRED)
+    (users_folder / "st orm").mkdir()
+    shutil.copy(BRIEF, users_folder / "st orm" / "b.yaml")
+    settings = ("--set", "coordinator.allocator=own:Tired")
+    code, out, _ = called("storm", "st orm/b.yaml", *settings, "--seeds", "9..9", "--again", "0", "--jobs", "1")
+    found = re.search(r"^seed 9: (.*tired.*); again: secondlook (.*)$", out, re.MULTILINE)
+    assert code == 1
+    assert found, out
+    code, out, _ = called(*shlex.split(found[2]), "--out", "of one")
+    assert (code, out.splitlines()[0]) == (1, found[1])
+    assert "\nThe moment: secondlook view 'of one/flight-1' --at " in out

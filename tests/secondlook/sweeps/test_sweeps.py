@@ -317,12 +317,13 @@ class TestStandings:
 
 class TestCommand:
     def test_it_flies_shows_and_writes_a_page(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-        out = tmp_path / "out"
+        out = tmp_path / "my out"
         asked = ["sweep", str(BRIEF), "--seeds", "1..2", "--vary", "coordinator.allocator=plan,none", "--out", str(out)]
         _command(asked, "--jobs", "2")
         told = capsys.readouterr().out
         assert "brief, 4 of 4 missions" in told
         assert "allocator=none" in told
+        assert shlex.split(told.splitlines()[-1])[-4:] == ["secondlook", "sweep", str(out), "--show"]
         before = pq.read_table(out / "missions.parquet")
         _command(asked)
         assert pq.read_table(out / "missions.parquet").equals(before)
