@@ -4,6 +4,7 @@ a run's folder is."""
 from __future__ import annotations
 
 import contextlib
+import errno
 import io
 import os
 import tempfile
@@ -28,9 +29,11 @@ class CannotWriteError(UserError, FileError):
 def whole_file(path: Path, *, lasts: bool = True) -> Iterator[BinaryIO]:
     """A file to write, which takes its place, and that of one that is there, when all is written: whoever reads it
     finds the old one or the new one, also after a loss of power where it `lasts`. Raises CannotWriteError."""
-    there = path.resolve()  # what a link leads to is written, and the link stays
+    there = Path(os.path.realpath(path))  # what a link leads to is written, and the link stays
     beside = there.with_name(f".{there.name}.{os.getpid()}.part")
     try:
+        if there.is_symlink():
+            raise OSError(errno.ELOOP, os.strerror(errno.ELOOP))
         if there.exists() and not there.is_file():  # a pipe or a terminal: nothing can take its place
             with there.open("wb") as file:
                 yield file

@@ -64,6 +64,16 @@ def test_a_link_stays_and_a_device_is_written_to(tmp_path: Path) -> None:
     assert not Path(os.devnull).is_file()
 
 
+def test_links_that_lead_to_each_other_are_told_and_stay(tmp_path: Path) -> None:
+    (tmp_path / "a").symlink_to("b")
+    (tmp_path / "b").symlink_to("a")
+    for path in (tmp_path / "a", tmp_path / "a" / "file"):
+        with pytest.raises(CannotWriteError, match="Too many levels of symbolic links; must be a file that can be wr"):
+            write_whole(path, "text")
+    assert sorted(tmp_path.iterdir()) == [tmp_path / "a", tmp_path / "b"]
+    assert (tmp_path / "a").is_symlink()
+
+
 def test_a_file_in_no_folder_is_told(tmp_path: Path) -> None:
     with pytest.raises(CannotWriteError, match=r"gone/a: No such file or directory; must be a file that can be writt"):
         write_whole(tmp_path / "gone" / "a", "text")
