@@ -107,6 +107,9 @@ def _problem(
         what = allowed(error)
     if made_from is not None:
         path, value = made_from
+    elif isinstance(value, dict):  # shown with the keys that were given
+        given = {source[-1]: one for source, one in written.values() if source[:-1] == path}
+        value = given | {key: one for key, one in value.items() if (*path, key) not in written}
     if not path:  # of the whole file
         return Problem(place_of(path, places), f"a key {what}" if kind == "string_unicode" else what)
     text = shown(value)

@@ -5,11 +5,12 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Annotated, Literal
 
 import shapely
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, field_validator
+from pydantic_core import PydanticCustomError
 
 from comms.said.announcement import LARGEST_SEED, LONGEST_NAME, MOST_VEHICLES
 from comms.said.routing import driver_of, modem_of
@@ -29,6 +30,7 @@ from secondlook.scenario.values import (
     Mapping,
     OpenShare,
     Share,
+    all_refused,
     check_pair,
     check_utc,
     plug_in,
@@ -310,62 +312,14 @@ class Scenario(Mapping):
 
     @field_validator("vehicles")
     @classmethod
-    def _check_survey(cls, vehicles: dict[str, Vehicle]) -> dict[str, Vehicle]:
-        if not any(isinstance(vehicle, SurveyVehicle) for vehicle in vehicles.values()):
-            raise refused("must have a vehicle with role survey")
-        return vehicles
-
-    @field_validator("vehicles")
-    @classmethod
-    def _check_starts(cls, vehicles: dict[str, Vehicle], info: ValidationInfo) -> dict[str, Vehicle]:
-        zones = info.data["area"].keep_out if "area" in info.data else ()
-        current = info.data.get("current")
+    def _check_vehicles(cls, vehicles: dict[str, Vehicle], info: ValidationInfo) -> dict[str, Vehicle]:
+        area: Area | None = info.data.get("area")
+        zones = [] if area is None else [shapely.Polygon(zone) for zone in area.keep_out]
+        mistakes = list(_wrong_together(vehicles))
         for key, vehicle in vehicles.items():
-            places = [(vehicle.start.x_m, vehicle.start.y_m), vehicle.home_m]
-            if isinstance(current, GridCurrent) and (told := current.outside(places)):
-                raise refused(f"must all start, and have their home, where the current is given, but {key}: {told}")
-            start, home = shapely.Point(vehicle.start.x_m, vehicle.start.y_m), shapely.Point(vehicle.home_m)
-            if any(shapely.Polygon(zone).intersects(start) for zone in zones):
-                raise refused(f"must all start outside area.keep_out_m, but {key} starts in it")
-            if any(shapely.Polygon(zone).intersects(home) for zone in zones):
-                raise refused(f"must all have their home outside area.keep_out_m, but that of {key} lies in it")
-        return vehicles
-
-    @field_validator("vehicles")
-    @classmethod
-    def _check_bodies(cls, vehicles: dict[str, Vehicle]) -> dict[str, Vehicle]:
-        for key, vehicle in vehicles.items():
-            if vehicle.body == "external" and body_of(key) in vehicles:
-                raise refused(f"must have no {body_of(key)}, as the external body of {key} is called")
-        return vehicles
-
-    @field_validator("vehicles")
-    @classmethod
-    def _check_speeds(cls, vehicles: dict[str, Vehicle], info: ValidationInfo) -> dict[str, Vehicle]:
-        current = info.data.get("current")
-        if current is not None:
-            for key, vehicle in vehicles.items():
-                fastest_mps, where = current.fastest
-                if vehicle.speed_mps < fastest_mps + LEAST:
-                    least_mps = fastest_mps + LEAST
-                    raise refused(
-                        f"must be faster than the current, {least_mps:.4g} m/s or more{where}, but {key} is not"
-                    )
-        return vehicles
-
-    @field_validator("vehicles")
-    @classmethod
-    def _check_parts(cls, vehicles: dict[str, Vehicle]) -> dict[str, Vehicle]:
-        shares = {one.share_of for one in vehicles.values() if isinstance(one, SurveyVehicle)}
-        counts = {count for _, count in shares}
-        if len(counts) > 1:
-            raise refused("must all survey the whole area, or each a share of as many")
-        missing = [
-            f"{share} of {count}" for count in counts for share in range(1, count + 1) if (share, count) not in shares
-        ]
-        if missing:
-            told = ", ".join(missing[:MOST_TOLD]) + (", and so on" if len(missing) > MOST_TOLD else "")
-            raise refused(f"must survey the whole area together, but nobody has share {told}")
+            mistakes += _wrong_with(key, vehicle, zones, info.data.get("current"))
+        if mistakes:
+            raise all_refused(mistakes)
         return vehicles
 
     @property
@@ -391,6 +345,43 @@ class Scenario(Mapping):
     def to_yaml(self) -> str:
         """This scenario as a file that loads as an equal one, defaults filled in and bundled curves written out."""
         return dump(self.model_dump(mode="json", exclude_none=True))
+
+
+def _wrong_together(vehicles: dict[str, Vehicle]) -> Iterator[PydanticCustomError]:
+    """What is wrong with the vehicles as a fleet."""
+    shares = {one.share_of for one in vehicles.values() if isinstance(one, SurveyVehicle)}
+    counts = {count for _, count in shares}
+    missing = [
+        f"{share} of {count}" for count in counts for share in range(1, count + 1) if (share, count) not in shares
+    ]
+    if not shares:
+        yield refused("must have a vehicle with role survey")
+    elif len(counts) > 1:
+        yield refused("must all survey the whole area, or each a share of as many")
+    elif missing:
+        yield refused(f"must survey the whole area together, but nobody has share {_listed(missing)}")
+    for key, vehicle in vehicles.items():
+        if vehicle.body == "external" and body_of(key) in vehicles:
+            yield refused(f"must have another id, as the external body of {key} is called so", (body_of(key),))
+
+
+def _wrong_with(
+    key: str, vehicle: Vehicle, zones: Sequence[shapely.Polygon], current: AnyCurrent | None
+) -> Iterator[PydanticCustomError]:
+    """What is wrong with one vehicle, `zones` being what it has to keep out of."""
+    for name, place in (("start", vehicle.start), ("home", vehicle.home)):
+        if place is None:
+            continue
+        place_m = place.x_m, place.y_m
+        if isinstance(current, GridCurrent) and (told := current.outside([place_m])):
+            yield refused(f"must lie where the current is given, but {told}", (key, name))
+        if any(zone.intersects(shapely.Point(place_m)) for zone in zones):
+            yield refused("must lie outside area.keep_out_m", (key, name))
+    if current is not None:
+        fastest_mps, where = current.fastest
+        least_mps = fastest_mps + LEAST
+        if vehicle.speed_mps < least_mps:
+            yield refused(f"must be faster than the current, {least_mps:.4g} m/s or more{where}", (key, "speed_mps"))
 
 
 CYCLE_UNDER_S = 1 << SECOND_BITS

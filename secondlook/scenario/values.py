@@ -6,11 +6,12 @@ float.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from datetime import UTC, datetime
 from itertools import pairwise
 from typing import Annotated
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInfo, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, model_validator
 from pydantic_core import PydanticCustomError
 
 from secondlook.scenario.plug_ins import PlugInError, PlugInKind
@@ -40,6 +41,11 @@ def refused(allowed: str, within: tuple[str | int, ...] = ()) -> PydanticCustomE
     """The error to raise for a value, in the words that follow `... is not allowed; `. `within`: where in the value
     that is checked the one stands that is told, as far as the user has written it apart."""
     return PydanticCustomError("refused", "{allowed}", {"allowed": allowed, "within": within})
+
+
+def all_refused(mistakes: Iterable[PydanticCustomError]) -> ValidationError:
+    """The error to raise for a value with which several things are wrong, each as `refused` says it."""
+    return ValidationError.from_exception_data("value", [{"type": one, "input": None} for one in mistakes])
 
 
 def plug_in(kind: PlugInKind) -> AfterValidator:

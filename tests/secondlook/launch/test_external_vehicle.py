@@ -114,7 +114,8 @@ def test_without_a_simulated_vehicle_there_is_no_world() -> None:
 def test_no_vehicle_may_have_the_bodys_name(tmp_path: Path) -> None:
     scenario = tmp_path / "bay.yaml"
     scenario.write_text(BAY.read_text().replace("  primary:", "  helper-body:"))
-    with pytest.raises(ScenarioError, match=r"must have no helper-body, as the external body of helper is called$"):
+    told = r"vehicles\.helper-body: .* must have another id, as the external body of helper is called so$"
+    with pytest.raises(ScenarioError, match=told):
         load_scenario(str(scenario))
 
 

@@ -172,9 +172,12 @@ def test_every_vehicle_must_be_faster_and_start_where_it_is_given(load: Callable
     fast = [f"{x},{y},{1.5 if (x, y) == (250, 410) else 0},0" for x in (-10, 250, 510) for y in (-50, 410)]
     with pytest.raises(ScenarioError) as caught:
         load(HEADING + "\n".join(fast))
-    told = "must be faster than the current, 1.51 m/s or more at x 250, y 410, 0 s, but primary is not"
-    assert str(caught.value).endswith(told)
+    told = "vehicles.primary.speed_mps: 1.5 is not allowed; must be faster than the current, 1.51 m/s or more"
+    assert str(caught.value).endswith(f": {told} at x 250, y 410, 0 s")
     with pytest.raises(ScenarioError) as caught:
         load(HEADING + "\n".join(f"{x},{y},0,0" for x in (0, 500) for y in (0, 400)))
-    told = "where the current is given, but primary: x 0, y -40 lies outside of x 0 to 500, y 0 to 400"
-    assert str(caught.value).endswith(told)
+    told = "must lie where the current is given, but x 0, y -40 lies outside of x 0 to 500, y 0 to 400"
+    starts = [("primary", '{"x_m": 0, "y_m": -40}'), ("helper", '{"x_m": 0, "y_m": -40}')]
+    assert [problem.text for problem in caught.value.problems] == [
+        f"vehicles.{key}.start: {start} is not allowed; {told}" for key, start in starts
+    ]
