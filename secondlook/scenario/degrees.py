@@ -227,7 +227,7 @@ class _Frame:
     epsg: int | None = None
 
     def place_m(self, path: KeyPath, place: tuple[float, float]) -> list[Value]:
-        """Of latitude and longitude, or of easting and northing."""
+        """Of latitude and longitude, or of easting and northing. Where these are keys, `path` is the first one's."""
         longitude_deg, latitude_deg = place[::-1] if self.epsg is None else utm_to_degrees(self.epsg, *place)
         x_m, y_m = (float(one) for one in self.origin.to_metres(longitude_deg, latitude_deg))
         if not math.hypot(x_m, y_m) <= FARTHEST_KM * 1000:
@@ -237,8 +237,17 @@ class _Frame:
             hint = "; latitude comes first" if isinstance(path[-1], int) else ""
             if self.epsg is not None:
                 hint = f"; easting comes first, and the zone is that of EPSG:{self.epsg}"
+            if path[-1] in _PARTNER:  # told is the one that leads farther away
+                east, north = ("longitude_deg", "latitude_deg") if self.epsg is None else ("easting_m", "northing_m")
+                path = (*path[:-1], east if self._is_rather_east(longitude_deg, latitude_deg) else north)
             raise RefusedError(path, [*place], f"must be within {FARTHEST_KM} km of origin{hint}")
         return [round(x_m, 3) + 0.0, round(y_m, 3) + 0.0]
+
+    def _is_rather_east(self, longitude_deg: float, latitude_deg: float) -> bool:
+        """Whether a place lies farther to the east or west of the origin than to the north or south."""
+        east_deg = abs((longitude_deg - self.origin.longitude_deg + 180) % 360 - 180)
+        shrunk_deg = east_deg * math.cos(math.radians(self.origin.latitude_deg))
+        return shrunk_deg > abs(latitude_deg - self.origin.latitude_deg)
 
     def ring_m(self, path: KeyPath, corners: Sequence[tuple[float, float]]) -> list[Value]:
         """Of a ring, whose last corner may be its first again."""
