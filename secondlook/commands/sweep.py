@@ -62,22 +62,16 @@ def sweep(
         raise UserError("--out: is needed; must be a folder for the rows")
     asked = _plan(scenario, seeds, vary, set_, plan)
     check_figures(schema_of(asked), names)  # all that is asked for, before anything is made
-    missions = asked.count
-    failed = 0
 
     def fly(tell: Tell) -> None:
-        nonlocal failed
-
-        def progress(done: int, new_failures: int) -> None:
-            nonlocal failed
-            failed = new_failures
+        def progress(done: int, failed: int) -> None:
             tell(done, f"{failed} failed" if failed else "")
 
         with engine(jobs, dask) as flies:
             fly_missing(asked, out, flies, progress, limit_s=limit_s)
 
-    failure = fly_watched("sweep", "missions", missions, fly, shown=True)
-    _show(out, names, page=False)
+    failure = fly_watched("sweep", "missions", asked.count, fly, shown=True)
+    failed = _show(out, names, page=False)
     typer.echo(f"Files: {out}; how it stands: secondlook sweep {shlex.quote(str(out))} --show")
     if failure:
         sys.stderr.write(f"{failure}; the same command goes on\n")
@@ -99,12 +93,13 @@ def _plan(
     return load_sweep_plan(plan)
 
 
-def _show(folder: Path, names: list[str], *, page: bool = True) -> None:
+def _show(folder: Path, names: list[str], *, page: bool = True) -> int:
+    """Tells how a sweep stands; returns how many of its missions have failed."""
     flown = load_sweep(folder)
     stood = standings(flown, names)
     if not stood:
         typer.echo(f"{flown.scenario}, 0 of {flown.missions} missions: none is done yet, so there is nothing to show")
-        return
+        return 0
     told = table_of(flown, stood, names)
     console = Console(soft_wrap=True, highlight=False)
     console.width = max(console.width, Console(width=WIDEST).measure(told).maximum)  # nothing is cut off
@@ -114,3 +109,4 @@ def _show(folder: Path, names: list[str], *, page: bool = True) -> None:
         sys.stderr.write(f"failed: {text}\n")
     if page:
         typer.echo(f"Page: {write_page(flown, stood, names, folder)}")
+    return len(failures)

@@ -105,12 +105,12 @@ NOT_IN_ROWS = ("scenario", "version", "begun_utc", "bus", "processes", "factor",
                "separation.closest", "priorities", "dropped", "link.packets")  # fmt: skip
 
 
-def _command(arguments: list[str], *more: str) -> None:
+def _command(arguments: list[str], *more: str, code: int = 0) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("sys.argv", ["secondlook", *arguments, *more])
         with pytest.raises(SystemExit) as ended:
             cli.main()
-    assert ended.value.code == 0
+    assert ended.value.code == code
 
 
 @pytest.fixture
@@ -336,6 +336,12 @@ class TestCommand:
         told_before = before.drop_columns(["time.wall_s", "time.real_time_factor"])
         other = pq.read_table(tmp_path / "other" / "missions.parquet")
         assert other.drop_columns(["time.wall_s", "time.real_time_factor"]).equals(told_before)
+
+    def test_with_missions_that_failed_before_it_ends_as_with_new_ones(self, tmp_path: Path) -> None:
+        with own_processes(1) as engine:
+            fly_missing(plan(range(5, 6), vary={}), tmp_path, engine, flies=swept.fails_at_five)
+        _command(["sweep", str(BRIEF), "--seeds", "5", "--out", str(tmp_path)], code=1)
+        _command(["sweep", str(tmp_path), "--show"])
 
     def test_before_the_first_mission_is_done_it_says_so(
         self, tmp_path: Path, capsys: pytest.CaptureFixture[str]
