@@ -82,7 +82,7 @@ def sweep_folder(folder: Path, plan: SweepPlan) -> Iterator[SweepFolder]:
         opened = SweepFolder(folder, schema)
         opened.tidy()
         write_whole(folder / MADE_WITH, json.dumps(_made_with(plan), indent=2) + "\n")
-        write_whole(folder / PLAN, plan.to_yaml())
+        write_whole(folder / PLAN, plan.to_yaml(folder))
         yield opened
     finally:
         os.close(lock)

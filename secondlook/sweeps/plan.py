@@ -19,6 +19,7 @@ from comms.said.announcement import LARGEST_SEED
 from secondlook.errors import UserError
 from secondlook.fleet.build import build_fleet
 from secondlook.scenario import Scenario, ScenarioError, load_scenario, scenario_hash
+from secondlook.scenario.bundled import scenario_names
 from secondlook.scenario.load import load_model
 from secondlook.scenario.text import Value, dump, read_value
 from secondlook.scenario.values import Mapping as FileMapping
@@ -121,20 +122,31 @@ class SweepPlan:
 
     def command(self, mission: SweptMission) -> str:
         """What flies just this one again, with a recording."""
-        words = ["secondlook", "run", self.scenario, "--seed", str(mission.seed)]
+        words = ["secondlook", "run", self._from_anywhere, "--seed", str(mission.seed)]
         for setting in (*self.settings, *mission.combination.settings):
             words += ["--set", setting]
         return shlex.join(words)
 
-    def to_yaml(self) -> str:
-        """As a file that `load_sweep_plan` reads."""
+    def to_yaml(self, folder: Path) -> str:
+        """As a file in this folder that `load_sweep_plan` reads, wherever that is called."""
+        scenario = self._from_anywhere
         data: dict[str, Value] = {
-            "scenario": self.scenario,
+            "scenario": os.path.relpath(scenario, folder.resolve()) if Path(scenario).is_absolute() else scenario,
             "seeds": f"{self.seeds[0]}..{self.seeds[-1]}",
             "set": list(self.settings),
             "vary": {key: list(values) for key, values in self.vary.items()},
         }
         return dump(data)
+
+    @cached_property
+    def _from_anywhere(self) -> str:
+        """The scenario's name, or its file's path whatever the working directory."""
+        return self.scenario if self.scenario in scenario_names() else str(_lies_at(self.scenario))
+
+
+def _lies_at(file: str | Path) -> Path:
+    """A file's whole path; a link stays one, as the files that a scenario names lie beside it."""
+    return Path(file).parent.resolve() / Path(file).name
 
 
 def refuse_seed(settings: Sequence[str], instead: str) -> None:
@@ -231,5 +243,6 @@ def load_sweep_plan(path: str | os.PathLike[str]) -> SweepPlan:
     for key, values in told.vary.items():
         _check(key, values, f"{places[('vary', key)]}: vary.{key}")
     beside = Path(path).parent / told.scenario
-    scenario = str(beside) if beside.suffix and beside.exists() else told.scenario
+    is_file = told.scenario not in scenario_names() and beside.is_file()
+    scenario = str(_lies_at(beside)) if is_file else told.scenario
     return SweepPlan(scenario, told.seeds, tuple(told.set), told.vary)

@@ -115,7 +115,7 @@ class TestRefused:
 class TestPlanFile:
     def test_it_says_what_the_options_say(self, tmp_path: Path) -> None:
         asked = plan(settings=("mission.rho=0.5",), vary={**TWO, "coordinator.allocator": ["plan", "a b"]})
-        (tmp_path / "sweep.yaml").write_text(asked.to_yaml())
+        (tmp_path / "sweep.yaml").write_text(asked.to_yaml(tmp_path))
         assert load_sweep_plan(tmp_path / "sweep.yaml") == asked
 
     def test_a_scenario_lies_beside_it(self, tmp_path: Path) -> None:
@@ -123,6 +123,33 @@ class TestPlanFile:
         (tmp_path / "sweep.yaml").write_text("scenario: bay.yaml\nseeds: 3\n")
         read = load_sweep_plan(tmp_path / "sweep.yaml")
         assert (read.scenario, read.seeds, read.count) == (str(tmp_path / "bay.yaml"), range(3, 4), 1)
+
+    def test_wherever_it_is_called_it_flies_the_same_scenario(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        here, out = tmp_path / "here", tmp_path / "disk" / "runs" / "out"
+        for folder in (here, out):
+            folder.mkdir(parents=True)
+        (here / "bay").write_text(BRIEF.read_text())
+        (here / "runs").symlink_to(out.parent)
+        monkeypatch.chdir(here)
+        asked = plan(scenario="bay")
+        Path("runs/out/sweep.yaml").write_text(asked.to_yaml(Path("runs/out")))
+        commands = [asked.command(one) for one in asked.missions()]
+        monkeypatch.chdir(tmp_path)
+        for file in (out / "sweep.yaml", Path("here/runs/out/sweep.yaml")):
+            read = load_sweep_plan(file)
+            assert read.scenario == str(here / "bay")
+            assert [read.command(one) for one in read.missions()] == commands
+
+    def test_one_that_an_earlier_version_wrote_is_read_where_it_was_flown(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.chdir(tmp_path)
+        Path("bay.yaml").write_text(BRIEF.read_text())
+        Path("out").mkdir()
+        Path("out/sweep.yaml").write_text("scenario: bay.yaml\nseeds: 3\n")
+        assert [one.seed for one in load_sweep_plan("out/sweep.yaml").missions()] == [3]
 
     @pytest.mark.parametrize(
         ("text", "told"),

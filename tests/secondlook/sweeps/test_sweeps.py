@@ -26,7 +26,7 @@ from secondlook.files import CannotWriteError
 from secondlook.sweeps import folder as folder_module
 from secondlook.sweeps.fly import fly_missing
 from secondlook.sweeps.folder import read_rows, sweep_folder
-from secondlook.sweeps.plan import SweepPlan
+from secondlook.sweeps.plan import SweepPlan, load_sweep_plan
 from secondlook.sweeps.rows import flat, schema_of
 from secondlook.sweeps.standings import load_sweep, short_names, standings
 
@@ -144,6 +144,18 @@ class TestResumed:
         assert rows["coordinator.allocator"].to_pylist() == ["greedy", "plan", "none"] * 11
         with pytest.raises(UserError, match="was flown with seeds 0 to 10; must be a new folder, or asked for"):
             fly(plan(vary={"coordinator.allocator": ["greedy", "plan", "none"]}), tmp_path)
+
+    def test_its_own_plan_goes_on_in_another_working_directory(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        (tmp_path / "bay.yaml").write_text(BRIEF.read_text())
+        monkeypatch.chdir(tmp_path)
+        fly(plan(scenario="bay.yaml"), Path("runs/out"))
+        monkeypatch.chdir(tmp_path / "runs")
+        for _ in range(2):
+            assert fly(load_sweep_plan("out/sweep.yaml"), Path("out")).flown == []
+        (command, *_) = read_rows(Path("out"))["command"].to_pylist()
+        assert command.startswith(f"secondlook run {tmp_path}/bay.yaml --seed 1 --set ")
 
     def test_a_number_may_be_followed_by_one_that_is_not_whole(self, tmp_path: Path) -> None:
         fly(plan(vary={"vehicles.helper.speed_mps": [1, 2]}), tmp_path)
