@@ -10,6 +10,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from concurrent.futures import Executor
+    from typing import Any
+
+    from numpy.typing import NDArray
 
     from secondlook.preflight import MissionExpectation
     from secondlook.recorded import RecordedMission
@@ -37,7 +40,7 @@ def fly_sweep(
     folder: str | os.PathLike[str],
     *,
     seeds: range,
-    vary: Mapping[str, Sequence[object]] | None = None,
+    vary: Mapping[str, Sequence[object] | NDArray[Any]] | None = None,
     settings: Sequence[str] = (),
     executor: Executor | None = None,
     side_by_side: int | None = None,

@@ -11,6 +11,7 @@ from typing import Any
 
 from secondlook.engine.engine import Engine, do_all, own_processes
 from secondlook.engine.work_process import Lost
+from secondlook.errors import UserError
 from secondlook.sweeps.folder import sweep_folder
 from secondlook.sweeps.plan import SweepPlan, SweptMission, checked
 from secondlook.sweeps.rows import fly, row_of
@@ -60,12 +61,14 @@ def fly_sweep(
     scenario: str,
     folder: str,
     seeds: range,
-    vary: Mapping[str, Sequence[Any]],
+    vary: Mapping[str, Any],
     settings: Sequence[str],
     executor: Executor | None,
     side_by_side: int | None,
 ) -> Sweep:
     """See `secondlook.fly_sweep`."""
+    if side_by_side is not None and side_by_side < 1:
+        raise UserError(f"side_by_side: {side_by_side} is not allowed; must be at least 1")
     slots = side_by_side or os.cpu_count() or 1
     plan = SweepPlan(scenario, seeds, tuple(settings), checked(vary))
     engine: AbstractContextManager[Engine] = (

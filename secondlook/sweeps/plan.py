@@ -13,6 +13,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 from pydantic import Field, PlainValidator
 
 from comms.said.announcement import LARGEST_SEED
@@ -202,13 +203,27 @@ def varied(options: Sequence[str]) -> dict[str, Sequence[Value]]:
 
 
 def checked(vary: Mapping[str, Any]) -> dict[str, Sequence[Value]]:
-    """What is to be varied, by key; raises UserError for what is no list of values, for a key without any, or with one
-    twice."""
+    """What is to be varied, by key; numbers and arrays of numpy as plain ones. Raises UserError for what is no list of
+    values, for a key without any, or with one twice, and for what no scenario's file can hold."""
+    found = dict[str, Sequence[Value]]()
     for key, values in vary.items():
-        if isinstance(values, str) or not isinstance(values, Sequence):
+        if isinstance(values, str) or not isinstance(values, Sequence | np.ndarray):
             raise UserError(f"vary {key}: {values!r} is not allowed; must be a list of values")
-        _check(key, values, f"vary {key}")
-    return {key: list(values) for key, values in vary.items()}
+        found[key] = [_plain(one, f"vary {key}") for one in values]
+        _check(key, found[key], f"vary {key}")
+    return found
+
+
+def _plain(value: Any, place: str) -> Value:
+    if isinstance(value, np.generic | np.ndarray):
+        value = value.tolist()
+    if isinstance(value, Mapping):
+        return {str(key): _plain(one, place) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(one, place) for one in value]
+    if value is None or isinstance(value, bool | int | float | str):
+        return value
+    raise UserError(f"{place}: {value!r} is not allowed; must be as a scenario's file has it")
 
 
 def _check(key: str, values: Sequence[Value], place: str) -> None:

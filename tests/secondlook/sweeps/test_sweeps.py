@@ -374,9 +374,17 @@ class TestFromPython:
         assert sweep.table["ending"].to_pylist() == ["over"] * 4
         assert sweep.table["mission.rho"].to_pylist() == [0, 1, 0, 1]
 
+    def test_what_is_varied_may_be_numbers_of_numpy(self, tmp_path: Path) -> None:
+        vary: dict[str, Any] = {"mission.rho": np.linspace(0.0, 0.5, 2), "targets.count": [np.int64(3)]}
+        sweep = secondlook.fly_sweep(BRIEF, tmp_path, seeds=range(1, 2), vary=vary, executor=Here())
+        assert (sweep.table["mission.rho"].to_pylist(), sweep.table["targets.count"].to_pylist()) == ([0, 0.5], [3, 3])
+
     @pytest.mark.parametrize(
         ("terms", "told"),
         [
+            ({"vary": {"mission.rho": [Here]}}, "is not allowed; must be as a scenario's file has it"),
+            ({"side_by_side": 0}, "side_by_side: 0 is not allowed; must be at least 1"),
+            ({"side_by_side": -1}, "side_by_side: -1 is not allowed; must be at least 1"),
             ({"seeds": range(0)}, "seeds: are none"),
             ({"seeds": range(1, 6, 2)}, "seeds: range(1, 6, 2) is not allowed; must be a range of step 1"),
             ({"seeds": range(3, 0, -1)}, "must be a range of step 1"),
