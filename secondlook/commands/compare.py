@@ -14,6 +14,7 @@ from rich.console import Console
 
 from comms.said.announcement import LARGEST_SEED
 from secondlook.commands.many_missions import Dask, Jobs, Tell, engine, fly_watched
+from secondlook.commands.remarks import remark_on
 from secondlook.compare.flights import Flown, contenders, fly_all
 from secondlook.compare.paired import OBJECTIVES, objective_of, verdict
 from secondlook.compare.standings import as_json as comparison_as_json
@@ -61,6 +62,7 @@ def compare(
         build_fleet(contender.scenario, record=False)
     if out is not None:
         _prepare(out)
+    remark_on([(mission, ())])  # allocators change nothing of it
     flown: Flown = {}
     numbers = range(first_seed, first_seed + seeds)
     shown = not as_json

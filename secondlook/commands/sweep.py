@@ -11,6 +11,7 @@ import typer
 from rich.console import Console
 
 from secondlook.commands.many_missions import Dask, Jobs, Tell, engine, fly_watched
+from secondlook.commands.remarks import remark_on
 from secondlook.errors import FAILED, UserError
 from secondlook.sweeps.fly import LIMIT_S, fly_missing
 from secondlook.sweeps.page import write_page
@@ -62,6 +63,7 @@ def sweep(
         raise UserError("--out: is needed; must be a folder for the rows")
     asked = _plan(scenario, seeds, vary, set_, plan)
     check_figures(schema_of(asked), names)  # all that is asked for, before anything is made
+    remark_on([(one.scenario, one.settings) for one in asked.combinations])
 
     def fly(tell: Tell) -> None:
         def progress(done: int, failed: int) -> None:

@@ -282,6 +282,13 @@ class TestCommand:
         assert code == 1  # a mission failed
         assert [one["name"] for one in json.loads(out)["contenders"]] == ["first", "other", "equal"]
 
+    def test_a_mission_that_run_refuses_is_compared_with_a_remark(self, command: Call, by_hand: None) -> None:
+        _, out, err = command("--json", "--set", "vehicles.primary.endurance_s=1000")
+        assert json.loads(out)["contenders"]
+        remark, *failed = err.splitlines()
+        assert remark.startswith("vehicles.primary.endurance_s: 1000 s ends its survey after about 1 of 8 tracks")
+        assert failed == ["other, seed 3: it failed"]
+
     def test_a_mission_that_fails_is_told_and_counted_and_the_others_are_compared(
         self, command: Call, by_hand: None
     ) -> None:

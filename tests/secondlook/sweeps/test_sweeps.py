@@ -355,6 +355,15 @@ class TestCommand:
         _command(["sweep", str(BRIEF), "--seeds", "5", "--out", str(tmp_path)], code=1)
         _command(["sweep", str(tmp_path), "--show"])
 
+    def test_missions_that_run_refuses_are_flown_with_a_remark(
+        self, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        asked = ["sweep", str(BRIEF), "--seeds", "1", "--vary", "vehicles.primary.endurance_s=60", "--jobs", "1"]
+        _command([*asked, "--out", str(tmp_path / "out")])
+        out, err = capsys.readouterr()
+        assert "brief, 1 of 1 missions" in out
+        assert err.startswith("--vary vehicles.primary.endurance_s=60: vehicles.primary.endurance_s: 60 s ends its ")
+
     def test_before_the_first_mission_is_done_it_says_so(
         self, tmp_path: Path, capsys: pytest.CaptureFixture[str]
     ) -> None:
