@@ -5,13 +5,17 @@ from __future__ import annotations
 import functools
 import hashlib
 import platform
+import sys
+from collections.abc import Iterable
 from importlib.metadata import version
 from pathlib import Path
 
 from secondlook.rooms import HOME, ROOMS
 
 Code = dict[str, str]
-"""By what it is, such as a room or `numpy`, its version; of ours a hash of what the files say."""
+"""By what it is, such as a room or `numpy`, its version; of ours, and of a user's modules, a hash of what the files
+say."""
+OURS = (*ROOMS, "secondlook")
 RECKONS = ("numpy", "shapely")
 KINDS = (".py", ".yaml")
 
@@ -19,8 +23,18 @@ KINDS = (".py", ".yaml")
 @functools.cache
 def code_here() -> Code:
     """The code that this process runs, as its files were when it was first asked for."""
-    ours = {room: _hash(HOME / room) for room in (*ROOMS, "secondlook")}
+    ours = {room: _hash(HOME / room) for room in OURS}
     return {**ours, **{name: version(name) for name in RECKONS}, "python": platform.python_version()}
+
+
+def code_of(modules: Iterable[str]) -> Code:
+    """The modules of a user's own among these that are loaded from a source file, as that is now."""
+    files = {name: Path(getattr(sys.modules.get(name), "__file__", None) or "") for name in modules}
+    return {
+        name: hashlib.sha256(file.read_bytes()).hexdigest()[:16]
+        for name, file in files.items()
+        if name.partition(".")[0] not in OURS and file.suffix == ".py" and file.is_file()
+    }
 
 
 def differing(one: Code, other: Code) -> list[str]:

@@ -152,6 +152,11 @@ NODE = PlugInKind(
 )
 
 
+def modules_in(text: str) -> set[str]:
+    """The modules of all that some JSON names as `package.module:Class`."""
+    return {module for module, _ in re.findall(f'"{_OWN.pattern}"', text)}
+
+
 def made(kind: PlugInKind, text: str, **arguments: object) -> Any:
     """The plug-in that `text` names, made of these arguments. Raises UserError where there is none or that fails."""
     try:

@@ -22,10 +22,11 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from secondlook.engine.code_here import code_here, differing
+from secondlook.engine.code_here import code_here, code_of, differing
 from secondlook.errors import UserError
 from secondlook.files import CannotWriteError, whole_file, write_whole
 from secondlook.scenario.errors import dotted
+from secondlook.scenario.plug_ins import modules_in
 from secondlook.sweeps.plan import SweepPlan
 from secondlook.sweeps.rows import TEXT, WHOLE, Row, as_cell, schema_of
 
@@ -91,9 +92,15 @@ def sweep_folder(folder: Path, plan: SweepPlan) -> Iterator[SweepFolder]:
 def _made_with(plan: SweepPlan) -> dict[str, Any]:
     """As the file holds it."""
     scenario = plan.combinations[0].scenario.model_dump(mode="json", exclude_none=True)
+    # What is varied, too: in a scenario a curve is what its maker has made.
+    texts = [
+        json.dumps(dict(plan.vary), ensure_ascii=False),
+        *(one.scenario.model_dump_json() for one in plan.combinations),
+    ]
+    modules = set[str]().union(*map(modules_in, texts))
     return {
         "version": version("secondlook"),
-        "code": code_here(),
+        "code": {**code_of(modules), **code_here()},
         "scenario": {**scenario, "seed": 0},
         "vary": {key: list(values) for key, values in plan.vary.items()},
         "seeds": [plan.seeds[0], plan.seeds[-1]],
@@ -110,7 +117,8 @@ def _check_same(folder: Path, plan: SweepPlan) -> None:
     except (OSError, ValueError) as error:
         raise UserError(f"--out {folder}: {MADE_WITH} cannot be read: {error}") from error
     now = MadeWith.model_validate_json(json.dumps(_made_with(plan)))
-    if code := differing(before.code, now.code):
+    both = before.code.keys() & now.code.keys()  # new values may be of modules that are new
+    if code := [name for name in differing(before.code, now.code) if name in both]:
         told = f"other code: {', '.join(code)} {'has' if len(code) == 1 else 'have'} changed"
     elif before.vary.keys() != now.vary.keys():
         told = f"{', '.join(before.vary) or 'nothing'} varied"

@@ -19,7 +19,7 @@ import work
 from flights import until
 
 from secondlook.engine import engine as engine_module
-from secondlook.engine.code_here import code_here, differing
+from secondlook.engine.code_here import code_here, code_of, differing
 from secondlook.engine.engine import BATCH_S, Engine, EngineError, OtherCodeError, do_all, own_processes
 from secondlook.engine.work_process import Lost, WorkProcess
 
@@ -208,6 +208,10 @@ class TestCode:
         monkeypatch.setattr(engine_module, "differing", lambda one, other: ["planner", "python"])
         with pytest.raises(OtherCodeError, match=r"has other code than this: planner, python must be the same"):
             all_of(Engine(Carrier(), lambda: 1), work.doubled)
+
+    def test_of_modules_those_of_the_users_that_have_a_source_file_are_told(self) -> None:
+        assert code_of(["sys", "planner.types", "not.there", "numpy.random.mtrand"]) == {}
+        assert code_of(["work"]).keys() == {"work"}
 
     def test_what_differs_is_named(self) -> None:
         here = code_here()

@@ -213,6 +213,37 @@ class TestRefusedFolder:
             fly(plan(), tmp_path)
 
     @pytest.mark.parametrize(
+        ("key", "ours", "own"),
+        [
+            ("coordinator.allocator", "plan", "class Own:\n    def assign(self, situation): ..."),
+            (
+                "coordinator.node",
+                "coordinator.coordinator:Coordinator",
+                "from coordinator.coordinator import Coordinator as Own",
+            ),
+            ("vehicles.primary.spacing", "adaptive", "from planner.spacing_planners import FixedSpacing as Own"),
+            (
+                "vehicles.primary.sensor.curve",
+                "muscle",
+                "from planner.types import DetectionCurve\ndef Own(): return DetectionCurve([0, 70], [0.9, 0.1])",
+            ),
+        ],
+    )
+    def test_one_of_other_code_of_the_users_says_which_module_has_changed(
+        self, users_folder: Path, key: str, ours: str, own: str
+    ) -> None:
+        (users_folder / "mine").mkdir()
+        module = users_folder / "mine" / "own.py"
+        module.write_text(own)
+        fly(plan(vary={key: [ours]}), users_folder / "out")
+        asked = plan(vary={key: [ours, "mine.own:Own"]})
+        assert len(fly(asked, users_folder / "out").flown) == 8
+        assert fly(asked, users_folder / "out").flown == []
+        module.write_text(f"{own}\n# other")
+        with pytest.raises(UserError, match=r"was flown with other code: mine\.own has changed; must be a new folder"):
+            fly(asked, users_folder / "out")
+
+    @pytest.mark.parametrize(
         ("changes", "told"),
         [
             (dict.fromkeys(("version", "code", "scenario", "vary", "seeds")), "version"),
