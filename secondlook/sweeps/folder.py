@@ -27,7 +27,7 @@ from secondlook.errors import UserError
 from secondlook.files import CannotWriteError, whole_file, write_whole
 from secondlook.scenario.errors import dotted
 from secondlook.scenario.plug_ins import modules_in
-from secondlook.sweeps.plan import SweepPlan
+from secondlook.sweeps.plan import Combination, SweepPlan
 from secondlook.sweeps.rows import TEXT, WHOLE, Row, as_cell, schema_of
 
 MADE_WITH, PLAN, ROWS, MISSIONS = "made_with.json", "sweep.yaml", "rows", "missions.parquet"
@@ -38,7 +38,8 @@ MOST_IN_FILE = 5000
 
 class MadeWith(BaseModel):
     """What must be the same for rows to be of one sweep, and which seeds and values there are: the first seed and the
-    last, and by key the values that were asked for."""
+    last, and by key the values that were asked for. `scenario`: with the first values; `missions`: by the hash of each
+    combination its values."""
 
     model_config = ConfigDict(strict=True)
 
@@ -46,6 +47,7 @@ class MadeWith(BaseModel):
     code: dict[str, str]
     scenario: dict[str, Any]
     vary: dict[str, list[Any]]
+    missions: dict[str, str]
     seeds: tuple[int, int]
 
 
@@ -91,7 +93,6 @@ def sweep_folder(folder: Path, plan: SweepPlan) -> Iterator[SweepFolder]:
 
 def _made_with(plan: SweepPlan) -> dict[str, Any]:
     """As the file holds it."""
-    scenario = plan.combinations[0].scenario.model_dump(mode="json", exclude_none=True)
     # What is varied, too: in a scenario a curve is what its maker has made.
     texts = [
         json.dumps(dict(plan.vary), ensure_ascii=False),
@@ -101,10 +102,15 @@ def _made_with(plan: SweepPlan) -> dict[str, Any]:
     return {
         "version": version("secondlook"),
         "code": {**code_of(modules), **code_here()},
-        "scenario": {**scenario, "seed": 0},
+        "scenario": _as_told(plan.combinations[0]),
         "vary": {key: list(values) for key, values in plan.vary.items()},
+        "missions": {one.hash: " ".join(one.settings) for one in plan.combinations},
         "seeds": [plan.seeds[0], plan.seeds[-1]],
     }
+
+
+def _as_told(combination: Combination) -> dict[str, Any]:
+    return {**combination.scenario.model_dump(mode="json", exclude_none=True), "seed": 0}
 
 
 def _check_same(folder: Path, plan: SweepPlan) -> None:
@@ -131,11 +137,20 @@ def _check_same(folder: Path, plan: SweepPlan) -> None:
         told = f"{gone[0]}, too"
     elif not (now.seeds[0] <= before.seeds[0] and before.seeds[1] <= now.seeds[1]):
         told = f"seeds {before.seeds[0]} to {before.seeds[1]}"
-    elif other := _other(before.scenario, now.scenario, {tuple(key.split(".")) for key in plan.vary}):
+    elif other := _other_scenario(before, plan):
         told = f"another scenario: {other}"
+    elif changed := [values for mission, values in before.missions.items() if mission not in now.missions]:
+        told = f"another scenario: a file that {changed[0]} names has changed"
     else:
         return
     raise UserError(f"--out {folder}: was flown with {told}; must be a new folder, or asked for as before")
+
+
+def _other_scenario(before: MadeWith, plan: SweepPlan) -> str:
+    """Where the scenario with the first values of before differs from what it was, see `_other`."""
+    first = {key: values[0] for key, values in before.vary.items()}
+    now = next(one for one in plan.combinations if {**one.values} == first)
+    return _other(before.scenario, json.loads(json.dumps(_as_told(now))), {tuple(key.split(".")) for key in plan.vary})
 
 
 def _other(before: Any, now: Any, but: set[tuple[str, ...]], path: tuple[str, ...] = ()) -> str:

@@ -204,6 +204,21 @@ class TestRefusedFolder:
             == f"--out {tmp_path}: was flown with {told}; must be a new folder, or asked for as before"
         )
 
+    def test_one_of_whose_files_one_has_changed_says_which_value_names_it(self, tmp_path: Path) -> None:
+        out, layout, none = tmp_path / "out", "targets.layout", ("targets.count=null",)
+        files = [tmp_path / name for name in ("a.csv", "b.csv")]
+        for place, file in enumerate(files):
+            file.write_text(f"x_m,y_m\n50,5{place}\n")
+        a, b = ({"file": str(file)} for file in files)
+        fly(plan(settings=none, vary={layout: [a]}), out)
+        for values in ([b, a], [a, b]):  # they may become more, and be in any order
+            fly(plan(settings=none, vary={layout: values}), out)
+        files[1].write_text("x_m,y_m\n50,50\n60,60\n")
+        told = r"another scenario: a file that targets\.layout=.*b\.csv.* names has changed; must"
+        with pytest.raises(UserError, match=told):
+            fly(plan(settings=none, vary={layout: [a, b]}), out)
+        assert len(read_rows(out)) == 16
+
     def test_one_of_other_code_says_what_has_changed(self, tmp_path: Path) -> None:
         fly(plan(), tmp_path)
         made_with = json.loads((tmp_path / "made_with.json").read_text())
