@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 import shapely
 from called import Call
@@ -45,6 +46,33 @@ def test_of_the_area_of_a_polygon_and_of_a_lane(called: Call, brief_run: Path) -
     assert told.out.endswith(risk(mission.mines_left(lane)))
 
 
+def test_places_in_degrees_are_those_in_metres(called: Call, charted_run: Path) -> None:
+    origin = secondlook.load(charted_run).origin
+    assert origin is not None
+    corners = [(10, 20), (70, 20), (70, 60)]
+    for option, points, width in (("--lane", corners[:2], ("--width", "20")), ("--polygon", corners, ())):
+        longitude_deg, latitude_deg = origin.to_degrees(*np.transpose(points))
+        degrees = " ".join(f"{one:.9f},{other:.9f}" for one, other in zip(latitude_deg, longitude_deg, strict=True))
+        metres = " ".join(f"{x_m},{y_m}" for x_m, y_m in points)
+        told = called("mines", str(charted_run), f"{option}-deg", degrees, *width)
+        assert told.out.startswith(f"in the {option[2:]} about ")
+        assert told == called("mines", str(charted_run), option, metres, *width)
+
+
+def test_places_in_degrees_that_are_small_or_far_away_are_refused(called: Call, charted_run: Path) -> None:
+    there = "44.0801,9.8301"
+    for option, points, must in (
+        ("--lane-deg", f"{there} {there}", "1 m or more from end to end"),
+        ("--polygon-deg", f"{there} 44.080101,9.8301 44.0801,9.830101", "1 m or more across"),
+        ("--lane-deg", "9.8301,44.0801 9.8302,44.0801", "a lane of which 0.01 m² does"),
+        ("--polygon-deg", "-44.08,-170.17 -44.08,-170.16 -44.07,-170.17", "a polygon of which 0.01 m² does"),
+    ):
+        told = called("mines", str(charted_run), option, points, *(["--width", "20"] if "lane" in option else []))
+        assert (told.code, told.out) == (2, "")
+        assert told.err.startswith(f"{option}: ")
+        assert told.err.endswith(f"must be {must}\n")
+
+
 def test_of_what_was_not_to_be_surveyed_it_says_so(called: Call, brief_run: Path) -> None:
     mission = secondlook.load(brief_run)
     east_m, north_m = mission.area.bounds[2:]
@@ -74,7 +102,7 @@ def test_points_may_be_written_in_several_ways(called: Call, brief_run: Path, po
 
 
 def test_what_lies_elsewhere_or_is_next_to_nothing_is_refused(called: Call, brief_run: Path) -> None:
-    for corners in ("-90,-90 -80,-90 -80,-80", "50,50 50.001,50 50,50.001"):
+    for corners in ("-90,-90 -80,-90 -80,-80", "50,50 52,50 50,50.001"):
         told = called("mines", str(brief_run), "--polygon", corners)
         assert told.code == 2
         assert told.err == "--polygon: nothing of the area lies there; must be a polygon of which 0.01 m² does\n"
