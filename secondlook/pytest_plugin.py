@@ -70,10 +70,10 @@ def make_fleet(request: pytest.FixtureRequest, tmp_path: Path, secondlook_bus: s
     request.node.stash[_MADE] = made
 
     def make(scenario: Any = "tellaro", **options: Any) -> Fleet:
-        fleet = Fleet(
-            _beside(request.path, scenario),
-            **{"bus": secondlook_bus, "folder": tmp_path / f"fleet-{len(made) + 1}", **options},
-        )
+        options = {"bus": secondlook_bus, "folder": tmp_path / f"fleet-{len(made) + 1}", **options}
+        if options["bus"] == "local" and _wanted_bus(request.node) == _BOTH:
+            options.pop("processes", None)  # of the test on the other bus
+        fleet = Fleet(_beside(request.path, scenario), **options)
         made.append(fleet)
         return fleet
 

@@ -57,7 +57,7 @@ def override(
     for name, path, number in (("--seed", ("seed",), seed), ("--cell", ("area", "cell_m"), cell_m)):
         if number is None:
             continue
-        place = Place(f"{name} {number:.12g}")
+        place = Place(f"{name} {number:.12g}" if isinstance(number, float) else f"{name} {number}")
         setting, value = said.get(path, ("", number))
         if setting and value != number:
             changed.problems.append(Problem(place, f"not allowed beside {option} {setting}, which says otherwise"))

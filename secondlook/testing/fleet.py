@@ -9,11 +9,13 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import count
+from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
 
 from comms.lockstep.drive import Lockstep
 from comms.node import Node, Received
+from comms.said.announcement import LARGEST_SEED
 from comms.session import PATIENCE_S
 from secondlook.errors import UserError
 from secondlook.fleet.build import build_fleet
@@ -26,7 +28,7 @@ from secondlook.testing.flight import Flight, Heard, delivered_until_ms, fail_if
 from secondlook.testing.full_disk import filling
 from secondlook.testing.inside import Inside
 from secondlook.testing.plan import TroublePlan, load_plan
-from secondlook.testing.trouble import Trouble
+from secondlook.testing.trouble import LARGEST_FAULT_SEED, Trouble
 
 ScenarioSource = str | os.PathLike[str] | Scenario | Mapping[str, Any]
 Overrides = Mapping[str, Any] | Sequence[str]
@@ -46,6 +48,7 @@ def scenario_from(source: ScenarioSource, overrides: Overrides = (), seed: int |
     settings = overrides if isinstance(overrides, Sequence) else [f"{k}={_written(v)}" for k, v in overrides.items()]
     if isinstance(overrides, str) or not all(isinstance(one, str) for one in settings):
         raise UserError(f"overrides: {overrides!r} is not allowed; must be a mapping or a list of KEY=VALUE")
+    seed = None if seed is None else _whole("seed", seed, 0, LARGEST_SEED)
     if isinstance(source, Scenario):
         return make_scenario(source.model_dump(mode="json", exclude_none=True), settings, seed)
     if isinstance(source, Mapping):
@@ -93,7 +96,7 @@ class Fleet(Trouble):
         seed: in place of the scenario's own.
         folder: where the files of each flight go, each into a folder of its own.
         bus: `local`, all in this process, or `zenoh`, a process for each node.
-        processes: on `zenoh`, over how many processes the nodes are spread.
+        processes: on `zenoh` alone, over how many processes the nodes are spread.
         record: with a recording, mission.rrd, and messages.mpk.
         fault_seed: decides which messages are struck by faults that have a probability.
         patience_s: wall time after which a node that does not answer is given up; `math.inf` to step through one.
@@ -122,10 +125,13 @@ class Fleet(Trouble):
         made: Made | None = None,
     ) -> None:
         self.scenario = scenario_from(scenario, overrides, seed)
+        fault_seed = _whole("fault_seed", fault_seed, 0, LARGEST_FAULT_SEED)
         super().__init__(build_fleet(self.scenario, record=False).routing(), fault_seed)
         self.bus = _checked(bus)
         self.folder = folder
-        self._processes = processes
+        self._processes = None if processes is None else _whole("processes", processes, 1)
+        if processes is not None and bus == "local":
+            raise UserError("processes: is not allowed on the bus local, where all is one process")
         self._record = record
         self._patience_s = patience_s
         self._made = made
@@ -185,8 +191,8 @@ class Fleet(Trouble):
         heard last. The condition is asked after each message from now on, in the order of sending, which is the same
         on both buses.
         """
-        if not timeout_s > 0:
-            raise UserError(f"timeout_s: {timeout_s} is not allowed; must be more than 0 simulated seconds")
+        if not isinstance(timeout_s, Real) or not timeout_s > 0:
+            raise UserError(f"timeout_s: {timeout_s!r} is not allowed; must be more than 0 simulated seconds")
         until_s = self.now_s + timeout_s
         flight, holds = self._fly(_Watch(self._new_heard(), self._until_now, condition, until_s), self.bus)
         if not holds:
@@ -311,6 +317,14 @@ def _told(one: Received) -> str:
     said = repr(one.message)
     said = said if len(said) <= _LONGEST else said[: _LONGEST - 3] + "..."
     return f"{one.key} from {one.sender} at {one.t_s:.3f} s: {said}"
+
+
+def _whole(name: str, number: int, least: int, most: int | None = None) -> int:
+    is_whole = isinstance(number, Integral) and not isinstance(number, bool)
+    if not is_whole or number < least or (most is not None and number > most):
+        span = f"of at least {least}" if most is None else f"from {least} to {most}"
+        raise UserError(f"{name}: {number!r} is not allowed; must be a whole number {span}")
+    return int(number)
 
 
 def _checked(bus: Bus) -> Bus:

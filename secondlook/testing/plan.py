@@ -14,7 +14,7 @@ from secondlook.scenario.link import FARTHEST_M
 from secondlook.scenario.load import load_model
 from secondlook.scenario.text import Value, dump
 from secondlook.scenario.values import Mapping, Share, refused
-from secondlook.testing.trouble import Trouble
+from secondlook.testing.trouble import LARGEST_FAULT_SEED, Trouble
 
 Duration = Annotated[float, Field(gt=0, le=1e7)]
 TimeOrZero = Annotated[float, Field(ge=0, le=1e7)]
@@ -165,7 +165,7 @@ class TroublePlan(Mapping):
 
     scenario: Scenario
     """The mission, as in a file of its own."""
-    fault_seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 0
+    fault_seed: Annotated[int, Field(ge=0, le=LARGEST_FAULT_SEED)] = 0
     """Decides which messages are struck by what has a probability."""
     core: Annotated[tuple[str, ...], Field(strict=False, max_length=65)] = ()
     """Node ids."""

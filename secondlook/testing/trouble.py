@@ -17,6 +17,8 @@ from secondlook.errors import UserError
 from secondlook.recorded.mission import chosen_keys
 from sim_world.channel_config import FARTHEST_M, Outage
 
+LARGEST_FAULT_SEED = 2**63 - 1
+
 
 class Trouble:
     """Schedules trouble for the fleet that `routing` describes; `seed` decides where what has a probability strikes.
@@ -83,14 +85,14 @@ class Trouble:
 
     def range_cut(self, to_m: float, *, for_s: float, from_s: float | None = None) -> None:
         """For a while modems hear nothing from `to_m` away or farther."""
-        if not 1 <= to_m <= FARTHEST_M:
-            raise UserError(f"range_cut: to_m: {to_m} is not allowed; must be from 1 to {FARTHEST_M:.0f} m")
+        if not isinstance(to_m, Real) or not 1 <= to_m <= FARTHEST_M:
+            raise UserError(f"range_cut: to_m: {to_m!r} is not allowed; must be from 1 to {FARTHEST_M:.0f} m")
         self._silence("range_cut", from_s, for_s, beyond_m=to_m)
 
     def jammed(self, *, for_s: float, from_s: float | None = None, loss: float = 1.0) -> None:
         """For a while a share of all frames is lost; which, if that is not all, the scenario's seed decides."""
-        if not 0 < loss <= 1:
-            raise UserError(f"jammed: loss: {loss} is not allowed; must be above 0, and at most 1")
+        if not isinstance(loss, Real) or not 0 < loss <= 1:
+            raise UserError(f"jammed: loss: {loss!r} is not allowed; must be above 0, and at most 1")
         self._silence("jammed", from_s, for_s, loss=loss)
 
     def drop(
@@ -183,8 +185,8 @@ class Trouble:
         readers = [one.node_id for one in self.routing.roster if not one.listens_only and one.role.value != "clock"]
         if to and to not in readers:
             raise UserError(f"{kind.value}: to: {to!r} is not allowed; must be one of {', '.join(readers)}")
-        if not 0 <= probability <= 1:
-            raise UserError(f"{kind.value}: probability: {probability} is not allowed; must be from 0 to 1")
+        if not isinstance(probability, Real) or not 0 <= probability <= 1:
+            raise UserError(f"{kind.value}: probability: {probability!r} is not allowed; must be from 0 to 1")
         from_ms = self._time_ms("from_s", from_s)
         until_ms = None if for_s == math.inf else from_ms + _span_ms("for_s", for_s)
         self._message_faults.append(MessageFault(kind, keys, probability, to, from_ms, until_ms, delay_ms))

@@ -217,6 +217,19 @@ def test_the_last_of_two_overrides_of_a_key_counts() -> None:
     assert scenario.targets.count == 5
 
 
+@pytest.mark.parametrize(
+    ("seed", "told"),
+    [
+        ("3", '--seed 3: seed: "3" is not allowed; must be a whole number'),
+        (2**40, "--seed 1099511627776: seed: 1099511627776 is not allowed; must be at most 4294967295"),
+    ],
+)
+def test_a_seed_that_is_none_is_told_as_it_was_given(seed: Any, told: str) -> None:
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario("tellaro", seed=seed)
+    assert str(caught.value) == told
+
+
 def test_a_seed_or_cell_may_be_said_twice_if_it_is_the_same() -> None:
     settings = ["seed=4", "seed=3", "area.cell_m=2"]
     scenario = load_scenario("tellaro", settings, seed=3, cell_m=2.0)

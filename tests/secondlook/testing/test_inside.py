@@ -104,7 +104,7 @@ def test_of_other_nodes_it_tells_nothing(inside: Inside) -> None:
 
 
 def test_before_the_end_and_over_zenoh_there_is_none(tmp_path: Path) -> None:
-    fleet = Fleet(BRIEF, folder=tmp_path, processes=1)
+    fleet = Fleet(BRIEF, folder=tmp_path)
     assert fleet.run_until(lambda heard: heard.now_s > 5, timeout_s=10).inside is None
     assert fleet.run(bus="zenoh").inside is None
 

@@ -23,10 +23,10 @@ def test_marked(fleet):
 def test_unmarked(fleet):
     assert fleet.scenario.name == "tellaro"
 
-@pytest.mark.fleet(bus="both", processes=1)
+@pytest.mark.fleet(bus="both")
 class TestBoth:
     def test_two(self, make_fleet, tmp_path):
-        fleets = [make_fleet("bay.yaml", seed=seed) for seed in (1, 2)]
+        fleets = [make_fleet("bay.yaml", seed=seed, processes=1) for seed in (1, 2)]
         assert len({fleet.run().digest for fleet in fleets}) == 2
         assert all(fleet.folder.parent == tmp_path for fleet in fleets)
 
@@ -121,6 +121,7 @@ def test_marks_that_make_no_sense_and_a_room_in_the_way_are_told(tmp_path: Path)
     told = {
         '"bay.yml"': "ScenarioError: bay.yml: no such file",
         'bus="can"': "mark fleet: bus 'can' is not allowed; must be local, zenoh or both",
+        "processes=2": "UserError: processes: is not allowed on the bus local, where all is one process",
         "fast=True": "got an unexpected keyword argument 'fast'",
     }
     for number, mark in enumerate(told):
