@@ -1,10 +1,11 @@
 """How files are written: small ones whole or not at all, streams so that they are readable as far as they go. And what
-a run's folder is."""
+a run's folder is, and whose."""
 
 from __future__ import annotations
 
 import contextlib
 import errno
+import fcntl
 import io
 import os
 import tempfile
@@ -65,6 +66,33 @@ def check_run_folder(path: Path) -> None:
         raise UserError(f"{path}: is a file; must be the folder of a run, as secondlook run writes it")
     if not path.is_dir():
         raise UserError(f"{path}: there is no such folder; must be the folder of a run")
+
+
+def make_folder(out: Path) -> None:
+    """Makes the folder given with --out, if it is not there. Raises UserError where it cannot be."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UserError(f"--out {out}: {error.strerror}; must be a folder that can be written") from error
+
+
+@contextmanager
+def own_folder(out: Path) -> Iterator[None]:
+    """Within it the folder given with --out, which is made if it is not there, is nobody else's who asks for it so.
+    Raises UserError where it cannot be, or is another process's."""
+    make_folder(out)
+    try:
+        lock = os.open(out, os.O_RDONLY)
+    except OSError as error:
+        raise UserError(f"--out {out}: {error.strerror}; must be a folder that can be written") from error
+    try:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            raise UserError(f"--out {out}: another process writes to it already; must be another folder") from error
+        yield
+    finally:
+        os.close(lock)
 
 
 @contextmanager

@@ -22,7 +22,7 @@ from secondlook.compare.standings import failures, standings, table
 from secondlook.errors import FAILED, UserError
 from secondlook.files import CannotWriteError, write_whole
 from secondlook.fleet.build import build_fleet
-from secondlook.launch.run_folder import make_new_folder
+from secondlook.launch.run_folder import own_new_folder
 from secondlook.scenario import load_scenario
 from secondlook.sweeps.plan import refuse_seed
 
@@ -60,9 +60,8 @@ def compare(
     chosen = contenders(mission, () if allocators is None else [name.strip() for name in allocators.split(",")])
     for contender in chosen:
         build_fleet(contender.scenario, record=False)
-    if out is not None:
-        _prepare(out)
-    remark_on([(mission, ())])  # allocators change nothing of it
+    if out is not None and find_spec("matplotlib") is None:
+        raise UserError("--out: the plot needs matplotlib, not installed here; the extra secondlook[plots] has it")
     flown: Flown = {}
     numbers = range(first_seed, first_seed + seeds)
     shown = not as_json
@@ -74,36 +73,32 @@ def compare(
 
         fly_all(chosen, numbers, flies, flown, progress)
 
-    with engine(jobs, dask) as flies:
-        failure = fly_watched("compare", "missions", seeds * len(chosen), fly, shown=shown)
-    stood = standings(flown)
-    reacting = verdict(chosen, {one.name: one.against_first for one in stood}, objective)
-    title = f"{mission.name}, seeds {numbers[0]} to {numbers[-1]}"
-    content = json.dumps(comparison_as_json(flown, stood, mission.name, objective, reacting), indent=2)
-    if as_json:
-        typer.echo(content)
-    elif stood:
-        judged = f"judged by {OBJECTIVES[objective].what} when the mission ends"
-        told = table(stood, f"{title}, {judged}\nIt ends {mission.mission.deadline} at the latest.", objective)
-        console = Console(soft_wrap=True, highlight=False)
-        console.width = max(console.width, Console(width=WIDEST).measure(told).maximum)  # nothing is cut off
-        console.print(told)
-        if reacting is not None:
-            typer.echo(reacting.sentence)
-    if out is not None and stood:
-        _write(content, flown, title, out)
-        if not as_json:
-            typer.echo(f"Files: {out / 'compare.json'}, {out / 'risk.png'}")
+    with own_new_folder(out):
+        remark_on([(mission, ())])  # allocators change nothing of it
+        with engine(jobs, dask) as flies:
+            failure = fly_watched("compare", "missions", seeds * len(chosen), fly, shown=shown)
+        stood = standings(flown)
+        reacting = verdict(chosen, {one.name: one.against_first for one in stood}, objective)
+        title = f"{mission.name}, seeds {numbers[0]} to {numbers[-1]}"
+        content = json.dumps(comparison_as_json(flown, stood, mission.name, objective, reacting), indent=2)
+        if as_json:
+            typer.echo(content)
+        elif stood:
+            judged = f"judged by {OBJECTIVES[objective].what} when the mission ends"
+            told = table(stood, f"{title}, {judged}\nIt ends {mission.mission.deadline} at the latest.", objective)
+            console = Console(soft_wrap=True, highlight=False)
+            console.width = max(console.width, Console(width=WIDEST).measure(told).maximum)  # nothing is cut off
+            console.print(told)
+            if reacting is not None:
+                typer.echo(reacting.sentence)
+        if out is not None and stood:
+            _write(content, flown, title, out)
+            if not as_json:
+                typer.echo(f"Files: {out / 'compare.json'}, {out / 'risk.png'}")
     sentences = [*failures(flown), *([failure] if failure else [])]
     if sentences:
         sys.stderr.write("".join(f"{sentence}\n" for sentence in sentences))
         raise typer.Exit(FAILED)
-
-
-def _prepare(folder: Path) -> None:
-    if find_spec("matplotlib") is None:
-        raise UserError("--out: the plot needs matplotlib, not installed here; the extra secondlook[plots] has it")
-    make_new_folder(folder)
 
 
 def _write(content: str, flown: Flown, title: str, folder: Path) -> None:

@@ -1,4 +1,4 @@
-"""What commands that fly many missions share: how far they are, a sentence where they are broken off, a folder."""
+"""What commands that fly many missions share: how far they are, and a sentence where they are broken off."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from importlib import import_module
 from importlib.util import find_spec
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -93,11 +92,3 @@ def fly_watched(command: str, missions: str, total: int, fly: Callable[[Tell], N
         except (EngineError, CannotWriteError) as error:
             return f"{error}, after {flown} of {total} {missions}"
     return ""
-
-
-def make_folder(out: Path) -> None:
-    """Makes the folder given with --out, if it is not there. Raises UserError where it cannot be."""
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UserError(f"--out {out}: {error.strerror}; must be a folder that can be written") from error

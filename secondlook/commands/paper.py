@@ -12,8 +12,9 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from secondlook.commands.many_missions import Dask, Tell, engine, fly_watched, make_folder
+from secondlook.commands.many_missions import Dask, Tell, engine, fly_watched
 from secondlook.errors import FAILED, UserError
+from secondlook.files import make_folder
 from secondlook.launch.processes import RunFailedError
 from secondlook.paper.measured import MeasuredMission, measure_all
 from secondlook.paper.published import PublishedMission, published_missions

@@ -15,10 +15,10 @@ from typing import Annotated
 import typer
 
 from comms.said.announcement import LARGEST_SEED
-from secondlook.commands.many_missions import Jobs, Tell, fly_watched, make_folder
+from secondlook.commands.many_missions import Jobs, Tell, fly_watched
 from secondlook.engine.work_process import Lost, WorkProcess
 from secondlook.errors import FAILED, UserError
-from secondlook.files import write_whole
+from secondlook.files import make_folder, write_whole
 from secondlook.fleet.build import build_fleet
 from secondlook.launch.mission import Bus
 from secondlook.scenario import Scenario, load_scenario

@@ -10,7 +10,7 @@ from datetime import datetime
 from pathlib import Path
 
 from secondlook.errors import UserError
-from secondlook.files import CannotWriteError
+from secondlook.files import CannotWriteError, make_folder, own_folder
 
 
 def run_folder(out: Path | None, name: str) -> Path:
@@ -33,13 +33,25 @@ def run_folder(out: Path | None, name: str) -> Path:
 
 def make_new_folder(out: Path) -> None:
     """Makes the folder given with --out, if it is not there. Raises UserError where it cannot be, or holds anything."""
+    make_folder(out)
     try:
-        out.mkdir(parents=True, exist_ok=True)
         taken = next(out.iterdir(), None)
     except OSError as error:
         raise UserError(f"--out {out}: {error.strerror}; must be a folder that can be written") from error
     if taken is not None:
         raise UserError(f"--out {out}: holds {taken.name} already; must be a new or empty folder")
+
+
+@contextmanager
+def own_new_folder(out: Path | None) -> Iterator[None]:
+    """Within it the folder given with --out is this process's alone; it is made as `make_new_folder` does. Without one
+    there is nothing to do."""
+    if out is None:
+        yield
+        return
+    with own_folder(out):
+        make_new_folder(out)
+        yield
 
 
 class _LogFile(logging.FileHandler):

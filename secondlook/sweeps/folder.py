@@ -7,9 +7,7 @@ process that writes.
 
 from __future__ import annotations
 
-import fcntl
 import json
-import os
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -24,7 +22,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from secondlook.engine.code_here import code_here, code_of, differing
 from secondlook.errors import UserError
-from secondlook.files import CannotWriteError, whole_file, write_whole
+from secondlook.files import CannotWriteError, own_folder, whole_file, write_whole
 from secondlook.scenario.errors import dotted
 from secondlook.scenario.plug_ins import modules_in
 from secondlook.sweeps.plan import Combination, SweepPlan
@@ -68,16 +66,7 @@ def sweep_folder(folder: Path, plan: SweepPlan) -> Iterator[SweepFolder]:
     UserError for a folder that holds anything else.
     """
     schema = schema_of(plan)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        lock = os.open(folder, os.O_RDONLY)
-    except OSError as error:
-        raise UserError(f"--out {folder}: {error.strerror}; must be a folder that can be written") from error
-    try:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            raise UserError(f"--out {folder}: another process flies this sweep already") from error
+    with own_folder(folder):
         for left in (*folder.glob(BROKEN_OFF), *(folder / ROWS).glob(BROKEN_OFF)):
             left.unlink()
         if any(folder.iterdir()):
@@ -87,8 +76,6 @@ def sweep_folder(folder: Path, plan: SweepPlan) -> Iterator[SweepFolder]:
         write_whole(folder / MADE_WITH, json.dumps(_made_with(plan), indent=2) + "\n")
         write_whole(folder / PLAN, plan.to_yaml(folder))
         yield opened
-    finally:
-        os.close(lock)
 
 
 def _made_with(plan: SweepPlan) -> dict[str, Any]:

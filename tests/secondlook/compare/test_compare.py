@@ -398,6 +398,24 @@ class TestCommand:
         assert err == "--out: the plot needs matplotlib, not installed here; the extra secondlook[plots] has it\n"
 
 
+def test_of_two_at_once_into_one_folder_the_second_is_refused(command: Call, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    first = subprocess.Popen(
+        [Path(sys.executable).with_name("secondlook"), "compare", BRIEF, "--seeds", "500", "--jobs", "1", "--out", out],
+        stdin=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        env={**os.environ, "TMPDIR": str(tmp_path)},
+    )
+    try:
+        assert until(lambda: any(tmp_path.glob("*/secondlook-*/events.jsonl")), 60)
+        code, printed, err = command(str(BRIEF), "--seeds", "1", "--out", str(out))
+    finally:
+        first.send_signal(signal.SIGINT)
+        assert first.wait(30) == 1
+    assert (code, printed) == (2, "")
+    assert err == f"--out {out}: another process writes to it already; must be another folder\n"
+
+
 def test_ctrl_c_ends_it_with_a_sentence_and_leaves_no_process_and_no_file(tmp_path: Path) -> None:
     process = subprocess.Popen(
         [Path(sys.executable).with_name("secondlook"), "compare", BRIEF, "--seeds", "500", "--jobs", "2"],

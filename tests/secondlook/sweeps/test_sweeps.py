@@ -298,7 +298,10 @@ class TestRefusedFolder:
         assert [one.name for one in tmp_path.iterdir()] == ["notes.txt"]
 
     def test_one_that_another_process_writes_to(self, tmp_path: Path) -> None:
-        with sweep_folder(tmp_path, plan()), pytest.raises(UserError, match="another process flies this sweep already"):
+        with (
+            sweep_folder(tmp_path, plan()),
+            pytest.raises(UserError, match="another process writes to it already"),
+        ):
             fly(plan(), tmp_path)
 
     def test_a_full_disk_is_told_and_nothing_is_half_written(
