@@ -18,9 +18,10 @@ from comms.said.announcement import LARGEST_SEED
 from secondlook.commands.many_missions import Jobs, Tell, fly_watched
 from secondlook.engine.work_process import Lost, WorkProcess
 from secondlook.errors import FAILED, UserError
-from secondlook.files import make_folder, write_whole
+from secondlook.files import write_whole
 from secondlook.fleet.build import build_fleet
 from secondlook.launch.mission import Bus
+from secondlook.launch.run_folder import make_new_folder, own_new_folder
 from secondlook.scenario import Scenario, load_scenario
 from secondlook.storm.campaign import (
     STORM_LIMIT_S,
@@ -40,6 +41,7 @@ from secondlook.sweeps.plan import refuse_seed, seed_range
 from secondlook.testing.fleet import Fleet
 from secondlook.testing.plan import TroublePlan, load_plan
 
+PLAN = "plan.yaml"
 MOST_STORMS = 1_000_000
 MOST_NAMED = 20  # of what was never tried
 
@@ -105,11 +107,14 @@ def storm(
         raise UserError("--shrink: not allowed without --seed or --plan; it shrinks a single storm")
     elif bus is not None:
         raise UserError("--bus: not allowed without --seed or --plan; of many storms --again says which fly over Zenoh")
-    elif canaries:
-        _look_for_canaries(mission, _range_of(seeds or "1..500"), jobs or os.cpu_count() or 1, out)
     else:
-        words = [*filter(None, [scenario]), *(word for one in set_ or () for word in ("--set", one))]
-        _fly_many(mission, words, _range_of(seeds or "1..100"), again, jobs or os.cpu_count() or 1, out)
+        numbers, side_by_side = _range_of(seeds or ("1..500" if canaries else "1..100")), jobs or os.cpu_count() or 1
+        with own_new_folder(out):
+            if canaries:
+                _look_for_canaries(mission, numbers, side_by_side, out)
+            else:
+                words = [*filter(None, [scenario]), *(word for one in set_ or () for word in ("--set", one))]
+                _fly_many(mission, words, numbers, again, side_by_side, out)
 
 
 def _range_of(seeds: str) -> range:
@@ -121,17 +126,17 @@ def _range_of(seeds: str) -> range:
 
 def _fly_one(plan: TroublePlan, folder: Path, bus: Bus, flights: int) -> None:
     Fleet.of_plan(plan, folder=folder)  # refuses trouble that does not fit the fleet, before there is a folder
-    make_folder(folder)
+    make_new_folder(folder, unless=PLAN)  # the folder of a storm takes one more flight
     if flights:
         plan = _shrunk(plan, folder, bus, flights)
-    write_whole(folder / "plan.yaml", plan.to_yaml())
+    write_whole(folder / PLAN, plan.to_yaml())
     outcome = fly_storm(plan, bus=bus, folder=folder, record=True)
     for violation in outcome.violations:
         typer.echo(str(violation))
     if not outcome.violations:
         how = "was over" if outcome.digest else "has failed, as its disk was full,"
         typer.echo(f"All that must hold does; the mission {how} at {outcome.end_s:.0f} s.")
-    typer.echo(f"Files: {folder}, the plan file plan.yaml among them")
+    typer.echo(f"Files: {folder}, the plan file {PLAN} among them")
     if outcome.violations:
         flown = shlex.quote(str(latest_flight(folder)))
         typer.echo(f"The moment: secondlook view {flown} --at {outcome.violations[0].t_s:g}")
@@ -173,8 +178,8 @@ def _shrunk(plan: TroublePlan, folder: Path, bus: Bus, flights: int) -> TroubleP
     if flown or failure:
         typer.echo(f"{what_is_left(plan, smallest)} {flown} flights.")
     if failure:
-        write_whole(folder / "plan.yaml", smallest.to_yaml())
-        sys.stderr.write(f"{failure}; the smallest until then is {folder / 'plan.yaml'}\n")
+        write_whole(folder / PLAN, smallest.to_yaml())
+        sys.stderr.write(f"{failure}; the smallest until then is {folder / PLAN}\n")
         raise typer.Exit(FAILED)
     return smallest
 
@@ -183,8 +188,6 @@ def _fly_many(
     mission: Scenario | None, words: Sequence[str], numbers: range, twice: int, jobs: int, out: Path | None
 ) -> None:
     """`words`: by which the command is told whose storms to fly."""
-    if out is not None:
-        make_folder(out)
     outcomes: Outcomes = {}
     again = shlex.join(["secondlook", "storm", *words, "--seed"])
 
@@ -219,8 +222,6 @@ def _fly_many(
 
 
 def _look_for_canaries(mission: Scenario | None, numbers: range, jobs: int, out: Path | None) -> None:
-    if out is not None:
-        make_folder(out)
     finds: dict[str, Find] = {}
 
     def fly(tell: Tell) -> None:

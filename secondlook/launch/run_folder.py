@@ -31,14 +31,15 @@ def run_folder(out: Path | None, name: str) -> Path:
     return out
 
 
-def make_new_folder(out: Path) -> None:
-    """Makes the folder given with --out, if it is not there. Raises UserError where it cannot be, or holds anything."""
+def make_new_folder(out: Path, unless: str = "") -> None:
+    """Makes the folder given with --out, if it is not there. Raises UserError where it cannot be, or holds anything,
+    unless that is, among others, the file `unless`."""
     make_folder(out)
     try:
         taken = next(out.iterdir(), None)
     except OSError as error:
         raise UserError(f"--out {out}: {error.strerror}; must be a folder that can be written") from error
-    if taken is not None:
+    if taken is not None and not (unless and (out / unless).is_file()):
         raise UserError(f"--out {out}: holds {taken.name} already; must be a new or empty folder")
 
 

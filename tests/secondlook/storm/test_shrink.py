@@ -197,13 +197,13 @@ def test_ctrl_c_keeps_the_smallest_until_then(tmp_path: Path, monkeypatch: pytes
     monkeypatch.setattr("secondlook.commands.storm.make_smaller", broken_off)
     monkeypatch.setattr("secondlook.commands.storm.violations_of", always_late)
     done = CliRunner().invoke(
-        app_for(["storm"]), ["storm", "--plan", str(tmp_path / "two.yaml"), "--shrink", "--out", str(tmp_path)]
+        app_for(["storm"]), ["storm", "--plan", str(tmp_path / "two.yaml"), "--shrink", "--out", str(tmp_path / "o")]
     )
     assert done.exit_code == 1
     assert "Left are 1 of 2 faults and 2 of 2 vehicles, in an area of 300 x 100 m" in done.output
-    told = f"interrupted after 0 of 300 flights; the smallest until then is {tmp_path / 'plan.yaml'}\n"
+    told = f"interrupted after 0 of 300 flights; the smallest until then is {tmp_path / 'o' / 'plan.yaml'}\n"
     assert done.output.endswith(told)
-    assert load_plan(tmp_path / "plan.yaml") == smaller
+    assert load_plan(tmp_path / "o" / "plan.yaml") == smaller
 
 
 def always_late(plan: TroublePlan, bus: str) -> tuple[Violation, ...]:

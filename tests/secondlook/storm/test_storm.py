@@ -278,6 +278,9 @@ def test_the_command_flies_many_and_one(tmp_path: Path) -> None:
     assert one.exit_code == 0, one.output
     assert load_plan(tmp_path / "o" / "plan.yaml") == storm_of(None, QUICK)
     assert (tmp_path / "o" / "flight-1" / "mission.rrd").is_file()
+    one = CliRunner().invoke(app_for(["storm"]), ["storm", "--seed", str(QUICK), "--out", str(tmp_path / "o")])
+    assert one.exit_code == 0, one.output
+    assert (tmp_path / "o" / "flight-2").is_dir()
 
 
 TIRED = """
