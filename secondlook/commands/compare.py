@@ -24,6 +24,7 @@ from secondlook.files import CannotWriteError, write_whole
 from secondlook.fleet.build import build_fleet
 from secondlook.launch.run_folder import own_new_folder
 from secondlook.scenario import load_scenario
+from secondlook.scenario.plug_ins import plug_ins_print_to_stderr
 from secondlook.sweeps.plan import refuse_seed
 
 MOST_SEEDS = 10_000
@@ -55,11 +56,12 @@ def compare(
 ) -> None:
     """Fly the same seeds with several allocators, and compare what they leave."""
     refuse_seed(set_ or (), "--first-seed and --seeds")
-    mission = load_scenario(scenario, set_ or ())
-    objective = objective_of(mission)
-    chosen = contenders(mission, () if allocators is None else [name.strip() for name in allocators.split(",")])
-    for contender in chosen:
-        build_fleet(contender.scenario, record=False)
+    with plug_ins_print_to_stderr():
+        mission = load_scenario(scenario, set_ or ())
+        objective = objective_of(mission)
+        chosen = contenders(mission, () if allocators is None else [name.strip() for name in allocators.split(",")])
+        for contender in chosen:
+            build_fleet(contender.scenario, record=False)
     if out is not None and find_spec("matplotlib") is None:
         raise UserError("--out: the plot needs matplotlib, not installed here; the extra secondlook[plots] has it")
     flown: Flown = {}

@@ -13,6 +13,7 @@ from planner.spacing import TOLERANCE_M, adapt_range, track_offsets
 from secondlook.commands.planned_survey import plan_as_geojson, plan_as_json, plan_as_text, planned_surveys
 from secondlook.errors import UserError
 from secondlook.scenario import load_scenario
+from secondlook.scenario.plug_ins import plug_ins_print_to_stderr
 
 LARGEST_M = 100_000
 
@@ -55,8 +56,9 @@ def plan(
 
 
 def _plan_scenario(name: str, settings: list[str], *, as_json: bool, as_geojson: bool) -> None:
-    scenario = load_scenario(name, settings)
-    surveys = planned_surveys(scenario)
+    with plug_ins_print_to_stderr():
+        scenario = load_scenario(name, settings)
+        surveys = planned_surveys(scenario)
     if as_json:
         typer.echo(json.dumps(plan_as_json(scenario, surveys)))
     elif as_geojson:

@@ -32,6 +32,7 @@ from secondlook.launch.watchdog import NoReturn, Watchdog
 from secondlook.preflight import MissionExpectation, expected_mission
 from secondlook.report import write_report
 from secondlook.scenario import Scenario, load_scenario
+from secondlook.scenario.plug_ins import plug_ins_print_to_stderr
 
 
 @contextmanager
@@ -150,7 +151,8 @@ def run(
 ) -> None:
     """Tell what a mission is expected to come to, fly it, and write what happened."""
     _check(bus, processes, real_time, keep_going=keep_going, live=live, web=web, no_record=no_record)
-    mission = load_scenario(scenario, set_ or (), seed, cell_m=cell)
+    with plug_ins_print_to_stderr():
+        mission = load_scenario(scenario, set_ or (), seed, cell_m=cell)
     check_bodies(mission)
     expected = None
     with contextlib.suppress(SpacingFailedError):  # when it is flown that is told with the whole traceback
@@ -168,7 +170,8 @@ def run(
             )
             summary, failure = dict[str, Any](), ""
             try:
-                summary = run_mission(mission, options)
+                with plug_ins_print_to_stderr():
+                    summary = run_mission(mission, options)
             except RunFailedError as error:
                 failure = str(error)
         unreported = "" if no_record or no_report else _report(folder, quiet=bool(failure), shown=not as_json)
@@ -199,7 +202,7 @@ def _tell_end(folder: Path, summary: dict[str, Any], failure: str, unreported: s
 def expected_of(mission: Scenario) -> MissionExpectation:
     """What a mission is expected to come to. Raises UserError for a spacing planner that does not come back."""
     try:
-        with Watchdog(PATIENCE_S) as watchdog:
+        with Watchdog(PATIENCE_S) as watchdog, plug_ins_print_to_stderr():
             watchdog.begin("what lays the tracks")
             expected = expected_mission(mission)
             watchdog.end()

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 from comms.errors import NO_FAILURES, in_words
 from coordinator.allocate.allocators import ALLOCATORS
@@ -25,6 +25,11 @@ _OWN = re.compile(r"([A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*):([A-Za-z_]\w*)")
 
 class PlugInError(Exception):
     """A plug-in that cannot be used; the text says what must be, and why this is not."""
+
+
+def plug_ins_print_to_stderr() -> contextlib.redirect_stdout[TextIO]:
+    """Within it what plug-ins print in this process goes there: standard output is for what a command tells."""
+    return contextlib.redirect_stdout(sys.stderr)
 
 
 @dataclass(frozen=True)

@@ -343,3 +343,32 @@ def test_what_it_answers_wrongly_is_told_before_anything_flies_too(folder: Path,
     assert code == 2
     said = f"ValueError: the spacing planner own:Hushed must answer decide {DECISION}None"
     assert error == f"own:Hushed has failed to lay tracks: {said}\n"
+
+
+LOUD = """
+from own import Every60, LastFirst
+
+print("hello")
+
+class Planner(Every60):
+    def decide(self, *asked):
+        print("hello")
+        return super().decide(*asked)
+
+class Allocator(LastFirst):
+    def assign(self, situation):
+        print("hello")
+        return super().assign(situation)
+"""
+
+
+@pytest.mark.parametrize(
+    "command", ["run --bus local --out run", "plan", "compare --allocators plan --seeds 1 --jobs 1"]
+)
+def test_what_a_part_prints_is_not_among_what_a_command_tells(folder: Path, called: Call, command: str) -> None:
+    (folder / "loud.py").write_text(LOUD)
+    parts = ("coordinator.allocator=loud:Allocator", "vehicles.primary.spacing=loud:Planner")
+    name, *words = command.split()
+    code, out, err = called(name, "bay.yaml", *words, "--json", *(word for one in parts for word in ("--set", one)))
+    assert (code, {*err.splitlines()}) == (0, {"hello"})
+    assert json.loads(out)
