@@ -68,12 +68,14 @@ def check_run_folder(path: Path) -> None:
         raise UserError(f"{path}: there is no such folder; must be the folder of a run")
 
 
-def make_folder(out: Path) -> None:
-    """Makes the folder given with --out, if it is not there. Raises UserError where it cannot be."""
+def make_folder(out: Path, mode: int = 0o777) -> None:
+    """Makes the folder given with --out, if it is not there; `mode`: with which rights. Raises UserError where it
+    cannot be."""
     try:
-        out.mkdir(parents=True, exist_ok=True)
+        out.mkdir(mode, parents=True, exist_ok=True)
     except OSError as error:
-        raise UserError(f"--out {out}: {error.strerror}; must be a folder that can be written") from error
+        why = "is a file" if out.is_file() else error.strerror
+        raise UserError(f"--out {out}: {why}; must be a folder that can be written") from error
 
 
 @contextmanager

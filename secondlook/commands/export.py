@@ -15,7 +15,7 @@ from secondlook.commands.reading import GEOJSON, reading
 from secondlook.errors import UserError
 from secondlook.export.kml import to_kml
 from secondlook.export.risk_levels import NAMES, qgis_style, risk_levels
-from secondlook.files import CannotWriteError, whole_file, write_whole
+from secondlook.files import CannotWriteError, make_folder, whole_file, write_whole
 from secondlook.progress import no_remark, shown_progress
 from secondlook.recorded import GeographicOrigin, RecordedMission, load_run, to_geojson
 from secondlook.recorded.geojson import collection, features_of
@@ -81,10 +81,7 @@ def _export(
     if place is None:
         raise UserError(f"{run}: the scenario has no origin; must be given: --origin LAT LON")
     folder = out or run / "export"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UserError(f"--out {folder}: {error.strerror}; must be a folder that can be written") from error
+    make_folder(folder)
     written = []
     for name, content in _files(mission, place, told):
         with whole_file(folder / name) as file:

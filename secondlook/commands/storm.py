@@ -120,7 +120,9 @@ def storm(
 def _range_of(seeds: str) -> range:
     numbers = seed_range(seeds)
     if not 0 < len(numbers) <= MOST_STORMS:
-        raise UserError(f"--seeds: {seeds} is not allowed; must be A..B, at most {MOST_STORMS} whole numbers")
+        raise UserError(
+            f"--seeds: {seeds} is not allowed; must be A..B with A at most B, at most {MOST_STORMS} whole numbers"
+        )
     return numbers
 
 

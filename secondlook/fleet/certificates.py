@@ -21,7 +21,7 @@ from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption,
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from secondlook.errors import UserError
-from secondlook.files import CannotWriteError
+from secondlook.files import CannotWriteError, make_folder
 from secondlook.scenario.vehicle import AUTHORITY
 
 OF_OTHERS = 0o077
@@ -141,9 +141,9 @@ def _usage(*, signs_certificates: bool) -> x509.KeyUsage:
 
 def _prepare(folder: Path, add: bool) -> None:
     """A folder that keys may be written into; none is made for `add`. Raises UserError."""
+    if not add:
+        make_folder(folder, 0o700)
     try:
-        if not add:
-            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         mode = folder.stat().st_mode & 0o777
         taken = next(folder.iterdir(), None)
     except OSError as error:

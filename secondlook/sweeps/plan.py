@@ -175,7 +175,9 @@ def seeds_of(text: str) -> range:
     """The seeds of A..B, both of which belong to it, or of a single number. Raises UserError."""
     seeds = _range_or_one(text)
     if not seeds:
-        raise UserError(f"--seeds: {text} is not allowed; must be A..B, whole numbers up to {LARGEST_SEED}")
+        raise UserError(
+            f"--seeds: {text} is not allowed; must be A..B with A at most B, whole numbers up to {LARGEST_SEED}"
+        )
     return seeds
 
 
@@ -240,7 +242,7 @@ def _seeds_in_file(value: object) -> range:
     is_known = isinstance(value, str | int) and not isinstance(value, bool)
     seeds = _range_or_one(str(value)) if is_known else range(0)
     if not seeds:
-        raise refused(f"must be A..B or one seed, whole numbers up to {LARGEST_SEED}")
+        raise refused(f"must be A..B with A at most B, or one seed, whole numbers up to {LARGEST_SEED}")
     return seeds
 
 

@@ -301,4 +301,4 @@ class TestCommand:
         taken.write_text("")
         code, out, err = command("--out", str(taken))
         assert (code, out) == (2, "")
-        assert err == f"--out {taken}: File exists; must be a folder that can be written\n"
+        assert err == f"--out {taken}: is a file; must be a folder that can be written\n"

@@ -11,7 +11,7 @@ from secondlook.errors import UserError
 from secondlook.sweeps.plan import SweepPlan, as_text, load_sweep_plan, seeds_of, varied
 
 TWO = {"coordinator.allocator": ["plan", "greedy"], "vehicles.helper.speed_mps": [2, 3.5]}
-NO_SEEDS = "is not allowed; must be A..B or one seed, whole numbers up to 4294967295"
+NO_SEEDS = "is not allowed; must be A..B with A at most B, or one seed, whole numbers up to 4294967295"
 
 
 def plan(**changes: object) -> SweepPlan:
@@ -105,7 +105,7 @@ class TestRefused:
 
     @pytest.mark.parametrize("seeds", ["", "a..b", "5..4", "1..4294967296", "-1", "1..2..3"])
     def test_what_are_no_seeds(self, seeds: str) -> None:
-        with pytest.raises(UserError, match=r"must be A\.\.B, whole numbers up to 4294967295"):
+        with pytest.raises(UserError, match=r"must be A\.\.B with A at most B, whole numbers up to 4294967295"):
             seeds_of(seeds)
 
     def test_one_seed_is_a_range(self) -> None:
