@@ -41,7 +41,8 @@ def test_the_allocator_shown_is_the_examples() -> None:
 
 
 def test_what_reads_a_mission_back_runs_as_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    run_mission(load_scenario(BRIEF), RunOptions(tmp_path, bus="local"))
+    origin = "origin={latitude_deg: 54.4, longitude_deg: 10.2}"
+    run_mission(load_scenario(BRIEF, [origin]), RunOptions(tmp_path, bus="local"))
     blocks = python_blocks("reading-back.md")
     printed = []
     for block in blocks:
@@ -49,7 +50,8 @@ def test_what_reads_a_mission_back_runs_as_shown(tmp_path: Path, capsys: pytest.
         assert shown != block
         exec(compile(shown, "reading-back.md", "exec"), {})
         printed.append(capsys.readouterr().out.splitlines())
-    with_secondlook, with_msgpack = printed
+    with_secondlook, (none_left,), with_msgpack = printed
+    assert 0.0 < float(none_left) < 1.0
     messages = read_messages(tmp_path / "messages.mpk")
     assert len(with_secondlook) == sum(key.startswith("coord/") for key, _ in messages) > 0
     assert with_msgpack == [f"{n} {key} {header_of(payload).sent_ms}" for n, (key, payload) in enumerate(messages, 1)]

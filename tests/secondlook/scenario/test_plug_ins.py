@@ -99,7 +99,7 @@ class Negative(CurveSonar):
 
 class Narrow(CurveSonar):
     def p_detect(self, *asked):
-        return super().p_detect(*asked)[..., :1]
+        return super().p_detect(*asked)[..., :-1]
 
 class Wordy(CurveSonar):
     def p_detect(self, *asked):
@@ -278,7 +278,7 @@ WRONG_SONARS = [
     ("Undecided", SONAR + r"Undecided, gives a P_d of nan at a range of \d+ m; must be 0 to 0\.999"),
     ("Certain", SONAR + r"Certain, gives a P_d of 1\.95 at a range of \d+ m; must be 0 to 0\.999"),
     ("Negative", SONAR + r"Negative, gives a P_d of -0\.3 at a range of \d+ m; must be 0 to 0\.999"),
-    ("Narrow", SONAR + r"Narrow, answers in the shape \(2, 4, 1\) to what has the shape \(2, 4, 26\)"),
+    ("Narrow", SONAR + r"Narrow, answers in the shape \(2, 4, 25\) to what has the shape \(2, 4, 26\)"),
     ("Wordy", SONAR + r"Wordy, must answer with an array of P_d, not 'well'"),
     ("Broken", r"IndexError: tuple index out of range \(own\.py, line \d+, in p_detect\)"),
 ]
