@@ -18,7 +18,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from secondlook.engine.code_here import code_here, code_of, differing
 from secondlook.errors import UserError
@@ -37,7 +37,7 @@ MOST_IN_FILE = 5000
 class MadeWith(BaseModel):
     """What must be the same for rows to be of one sweep, and which seeds and values there are: the first seed and the
     last, and by key the values that were asked for. `scenario`: with the first values; `missions`: by the hash of each
-    combination its values."""
+    combination its values; empty in a folder of an earlier version."""
 
     model_config = ConfigDict(strict=True)
 
@@ -45,7 +45,7 @@ class MadeWith(BaseModel):
     code: dict[str, str]
     scenario: dict[str, Any]
     vary: dict[str, list[Any]]
-    missions: dict[str, str]
+    missions: dict[str, str] = Field(default_factory=dict)
     seeds: tuple[int, int]
 
 
@@ -65,15 +65,15 @@ def sweep_folder(folder: Path, plan: SweepPlan) -> Iterator[SweepFolder]:
     The same is one of the same scenario, settings, code and varied keys; seeds and values may have been fewer. Raises
     UserError for a folder that holds anything else.
     """
-    schema = schema_of(plan)
+    schema, made_with = schema_of(plan), json.dumps(_made_with(plan), indent=2)
     with own_folder(folder):
         for left in (*folder.glob(BROKEN_OFF), *(folder / ROWS).glob(BROKEN_OFF)):
             left.unlink()
         if any(folder.iterdir()):
-            _check_same(folder, plan)
+            _check_same(folder, plan, MadeWith.model_validate_json(made_with))
         opened = SweepFolder(folder, schema)
         opened.tidy()
-        write_whole(folder / MADE_WITH, json.dumps(_made_with(plan), indent=2) + "\n")
+        write_whole(folder / MADE_WITH, made_with + "\n")
         write_whole(folder / PLAN, plan.to_yaml(folder))
         yield opened
 
@@ -100,7 +100,7 @@ def _as_told(combination: Combination) -> dict[str, Any]:
     return {**combination.scenario.model_dump(mode="json", exclude_none=True), "seed": 0}
 
 
-def _check_same(folder: Path, plan: SweepPlan) -> None:
+def _check_same(folder: Path, plan: SweepPlan, now: MadeWith) -> None:
     try:
         before = read_made_with(folder)
     except FileNotFoundError:
@@ -109,7 +109,6 @@ def _check_same(folder: Path, plan: SweepPlan) -> None:
         ) from None
     except (OSError, ValueError) as error:
         raise UserError(f"--out {folder}: {MADE_WITH} cannot be read: {error}") from error
-    now = MadeWith.model_validate_json(json.dumps(_made_with(plan)))
     both = before.code.keys() & now.code.keys()  # new values may be of modules that are new
     if code := [name for name in differing(before.code, now.code) if name in both]:
         told = f"other code: {', '.join(code)} {'has' if len(code) == 1 else 'have'} changed"

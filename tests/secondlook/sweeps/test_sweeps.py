@@ -204,6 +204,13 @@ class TestRefusedFolder:
             == f"--out {tmp_path}: was flown with {told}; must be a new folder, or asked for as before"
         )
 
+    def test_one_of_an_earlier_version_is_read(self, tmp_path: Path) -> None:
+        fly(plan(), tmp_path)
+        made_with = json.loads((tmp_path / "made_with.json").read_text())
+        assert len(made_with.pop("missions")) == 2
+        (tmp_path / "made_with.json").write_text(json.dumps(made_with))
+        assert len(load_sweep(tmp_path).table) == 16
+
     def test_one_of_whose_files_one_has_changed_says_which_value_names_it(self, tmp_path: Path) -> None:
         out, layout, none = tmp_path / "out", "targets.layout", ("targets.count=null",)
         files = [tmp_path / name for name in ("a.csv", "b.csv")]
