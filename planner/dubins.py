@@ -75,22 +75,7 @@ class DubinsPath:
         Returns:
             Shape (n, 3): x_m, y_m and heading_rad, in [0, 2 pi).
         """
-        ends_m = np.cumsum(self.lengths_m)
-        along_m = np.clip(distances_m, 0.0, ends_m[-1])
-        stretch = np.minimum(np.searchsorted(ends_m, along_m), 2)
-        start = np.array(self._stretch_starts)[stretch]
-        length_m = along_m - (ends_m - self.lengths_m)[stretch]
-        turned_rad = np.array(self.turns)[stretch] * length_m / self.turn_radius_m
-        # The chord of an arc, and of a straight stretch alike.
-        chord_m = length_m * np.sinc(turned_rad / _FULL_TURN_RAD)
-        chord_heading_rad = start[:, 2] + turned_rad / 2
-        return np.column_stack(
-            [
-                start[:, 0] + chord_m * np.sin(chord_heading_rad),
-                start[:, 1] + chord_m * np.cos(chord_heading_rad),
-                _compass(start[:, 2] + turned_rad),
-            ]
-        )
+        return poses_along([self], distances_m)
 
     @cached_property
     def _stretch_starts(self) -> tuple[Pose, Pose, Pose]:
@@ -98,6 +83,28 @@ class DubinsPath:
         (first_m, second_m, _), (first, second, _), radius_m = self.lengths_m, self.turns, self.turn_radius_m
         begin = along_arc(self.start, first_m, first / radius_m * first_m)
         return self.start, begin, along_arc(begin, second_m, second / radius_m * second_m)
+
+
+def poses_along(paths: Sequence[DubinsPath], distances_m: FloatArray) -> FloatArray:
+    """The same along paths, at least one, that follow each other, as if they were one."""
+    starts = np.array([start for path in paths for start in path._stretch_starts])
+    lengths_m, curvatures = np.array(
+        [(m, turn / one.turn_radius_m) for one in paths for m, turn in zip(one.lengths_m, one.turns, strict=True)]
+    ).T
+    ends_m = np.cumsum(lengths_m)
+    along_m = np.clip(distances_m, 0.0, ends_m[-1])
+    stretch = np.searchsorted(ends_m, along_m)
+    x_m, y_m, heading_rad = starts.take(stretch, axis=0).T
+    length_m = along_m - (ends_m - lengths_m).take(stretch)
+    turned_rad = curvatures.take(stretch) * length_m
+    # The chord of an arc, and of a straight stretch alike.
+    chord_m = length_m * np.sinc(turned_rad / _FULL_TURN_RAD)
+    chord_heading_rad = heading_rad + turned_rad / 2
+    poses = np.empty((along_m.size, 3))
+    poses[:, 0] = x_m + chord_m * np.sin(chord_heading_rad)
+    poses[:, 1] = y_m + chord_m * np.cos(chord_heading_rad)
+    poses[:, 2] = _compass(heading_rad + turned_rad)
+    return poses
 
 
 def along_arc(start: Pose, length_m: float, turned_rad: float) -> Pose:

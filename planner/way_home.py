@@ -93,27 +93,23 @@ class WayHome:
 
     def _ways(self, poses: FloatArray) -> tuple[FloatArray, FloatArray]:
         """How long the shorter of the ways over either side takes, and its heading of arrival."""
-        x_m, y_m, heading_rad = poses[:, 0], poses[:, 1], poses[:, 2]
-        lengths_m, arrivals_rad, turns_rad, straights_m = [], [], [], []
-        for side in (1.0, -1.0):
-            to_x_m = self.home[0] - (x_m + side * self.turn_radius_m * np.cos(heading_rad))
-            to_y_m = self.home[1] - (y_m - side * self.turn_radius_m * np.sin(heading_rad))
-            straight_m = np.sqrt(np.maximum(to_x_m**2 + to_y_m**2 - self.turn_radius_m**2, 0.0))
-            arrival_rad = np.arctan2(to_x_m, to_y_m) + side * np.arctan2(self.turn_radius_m, straight_m)
-            turn_rad = np.mod(side * (arrival_rad - heading_rad) + _ROUNDING_RAD, _FULL_TURN_RAD)
-            # Within the circle that it turns on it cannot come to.
-            within = np.hypot(to_x_m, to_y_m) < self.turn_radius_m * (1 - _ROUNDING_RAD)
-            lengths_m.append(np.where(within, np.inf, self.turn_radius_m * turn_rad + straight_m))
-            arrivals_rad.append(arrival_rad)
-            turns_rad.append(side * turn_rad)
-            straights_m.append(straight_m)
-        to_port = lengths_m[1] < lengths_m[0]
-        arrival_rad = np.where(to_port, *arrivals_rad[::-1])
+        (x_m, y_m, heading_rad), radius_m = poses.T, self.turn_radius_m
+        side = np.array([[1.0], [-1.0]])
+        to_x_m = self.home[0] - (x_m + side * (radius_m * np.cos(heading_rad)))
+        to_y_m = self.home[1] - (y_m - side * (radius_m * np.sin(heading_rad)))
+        straight_m = np.sqrt(np.maximum(to_x_m**2 + to_y_m**2 - radius_m**2, 0.0))
+        arrival_rad = np.arctan2(to_x_m, to_y_m) + side * np.arctan2(radius_m, straight_m)
+        turn_rad = np.mod(side * (arrival_rad - heading_rad) + _ROUNDING_RAD, _FULL_TURN_RAD)
+        # Within the circle that it turns on it cannot come to.
+        within = np.hypot(to_x_m, to_y_m) < radius_m * (1 - _ROUNDING_RAD)
+        length_m = np.where(within, np.inf, radius_m * turn_rad + straight_m)
+        shorter = length_m.argmin(axis=0), np.arange(len(poses))
+        arrival_rad = arrival_rad[shorter]
         if self.sailing.is_in_still_water:
-            time_s = np.where(to_port, *lengths_m[::-1]) / self.sailing.speed_mps
+            time_s = length_m[shorter] / self.sailing.speed_mps
         else:
-            turn_rad, straight_m = np.where(to_port, *turns_rad[::-1]), np.where(to_port, *straights_m[::-1])
-            time_s = self.sailing.turns_s(self.turn_radius_m, poses, turn_rad)
+            turn_rad, straight_m = (side * turn_rad)[shorter], straight_m[shorter]
+            time_s = self.sailing.turns_s(radius_m, poses, turn_rad)
             turned_x_m = self.home[0] - straight_m * np.sin(arrival_rad)
             turned_y_m = self.home[1] - straight_m * np.cos(arrival_rad)
             time_s += self.sailing.straights_s(straight_m, np.stack([turned_x_m, turned_y_m, arrival_rad], axis=-1))

@@ -13,7 +13,7 @@ from comms.said.announcement import RosterVehicle
 from comms.said.messages import AgentState, Mode, Plan, PlannedTrack
 from coordinator.vehicles import pass_of, pose_of, sailing_of, tracks_of
 from planner.currents import FlowGrid, Sailing
-from planner.dubins import DubinsPath, Pose
+from planner.dubins import DubinsPath, Pose, poses_along
 from planner.keep_out import NOWHERE, KeepOut
 from planner.sweep import Pass, shifted
 from planner.types import FloatArray
@@ -125,13 +125,7 @@ def course(
     circle = DubinsPath(end, turn_radius_m, (side, 0, 0), (speed_mps * (AHEAD_S + STEP_S), 0.0, 0.0))
     sails = Sails(start_s, speed_mps, tuple(paths), circle, sails_s, knots)
     times_s = STEP_S * np.arange(first, first + math.ceil(lasts_s / STEP_S), dtype=np.float64)
-    ways_m, parts, done, done_m = sails.way_m(times_s - start_s), [], 0, 0.0
-    for path in paths:
-        to = int(np.searchsorted(ways_m, done_m + path.length_m))
-        if to > done:
-            parts.append(path.poses_at(ways_m[done:to] - done_m))
-        done, done_m = to, done_m + path.length_m
-    poses = np.concatenate([*parts, circle.poses_at(ways_m[done:] - done_m)])
+    poses = poses_along([*paths, circle], sails.way_m(times_s - start_s))
     return Course(start_s, first, poses, start_s + sails_s, sails)
 
 
