@@ -33,6 +33,7 @@ KEEP_OUT: dict[str, Any] = {"facecolor": "0.9", "edgecolor": "0.45", "hatch": "/
 PRIORITY: dict[str, Any] = {"color": "deeppink", "linewidth": 1.2, "linestyle": "dashed"}
 WITH_A_VEHICLE: dict[str, Any] = {"color": "black", "linewidth": 1.8, "linestyle": "solid"}
 ENDED = (StripState.DONE, StripState.WITHDRAWN, StripState.FAILED)
+MARKERS = "os^Dv"  # of the first ten vehicles, which have a colour each, of the next ten, and so on
 MARGIN = 0.02  # around what is drawn, as a share of the longer side
 WAKE_S = 600.0  # of a vehicle's way, so much is drawn behind it
 
@@ -50,7 +51,10 @@ class MissionPicture:
         self._map, self._risk = self._figure.subplots(1, 2, width_ratios=(2.2, 1.0))
         colours = mpl.colormaps["tab10"].colors  # type: ignore[attr-defined]
         names = [one.vehicle for one in mission.run.vehicles]
-        self._colours = {name: colours[index % len(colours)] for index, name in enumerate(names)}
+        self._looks: dict[str, dict[str, Any]] = {
+            name: {"color": colours[index % 10], "marker": MARKERS[index // 10 % len(MARKERS)]}
+            for index, name in enumerate(names)
+        }
         self._hear_until(0.0)
         self._cells = self._laid_out()
         self._moving: list[Line2D] = []
@@ -107,13 +111,8 @@ class MissionPicture:
         axes.set_aspect("equal")
         axes.set_xlabel("east, m")
         axes.set_ylabel("north, m")
-        axes.legend(
-            handles=self._explained(),
-            loc="upper left",
-            bbox_to_anchor=(0, -0.12),
-            ncols=5,
-            frameon=False,
-            fontsize="small",
+        self._figure.legend(
+            handles=self._explained(), loc="outside lower left", ncols=6, frameon=False, fontsize="small"
         )
         times_s = [one.t_s for one in self._curve]
         self._risk.plot(times_s, [one.mean for one in self._curve], color="tab:blue", label="mean")
@@ -128,7 +127,7 @@ class MissionPicture:
     def _explained(self) -> list[Artist]:
         """What the legend tells."""
         return [
-            *(Line2D([], [], color=colour, marker="o", label=name) for name, colour in self._colours.items()),
+            *(Line2D([], [], label=name, **look) for name, look in self._looks.items()),
             Line2D([], [], label="strip, open", **OPEN),
             Line2D([], [], label="strip, with a vehicle", **WITH_A_VEHICLE),
             *([Patch(label="no vehicle may enter", **KEEP_OUT)] if self._mission.keep_out else []),
@@ -147,9 +146,11 @@ class MissionPicture:
         for name, path in self._mission.paths.items():
             first, last = np.searchsorted(path.t_s, [t_s - WAKE_S, t_s], side="right")
             if last:
-                x_m, y_m, colour = path.x_m[first:last], path.y_m[first:last], self._colours[name]
-                yield from self._map.plot(x_m, y_m, color=colour, linewidth=1, alpha=0.7, scalex=False, scaley=False)
-                yield from self._map.plot(x_m[-1], y_m[-1], "o", color=colour, markeredgecolor="white")
+                x_m, y_m, look = path.x_m[first:last], path.y_m[first:last], self._looks[name]
+                yield from self._map.plot(
+                    x_m, y_m, color=look["color"], linewidth=1, alpha=0.7, scalex=False, scaley=False
+                )
+                yield from self._map.plot(x_m[-1], y_m[-1], markeredgecolor="white", **look)
 
 
 def write_picture(mission: RecordedMission, t_s: float | None, path: Path, width_px: int) -> None:

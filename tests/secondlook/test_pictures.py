@@ -28,8 +28,7 @@ def unseen(picture: Image.Image) -> int:
 
 def told(picture: Figure) -> set[str]:
     """What the legend of the map tells."""
-    legend = picture.axes[0].get_legend()
-    assert legend is not None
+    (legend,) = picture.legends
     return {text.get_text() for text in legend.get_texts()}
 
 
@@ -55,6 +54,26 @@ def test_ground_to_keep_out_of_and_priorities_are_drawn(tmp_path: Path) -> None:
     assert [len(lines) for lines in pink] == [0, 0, 1]
     assert np.unique(pink[2][0].get_xydata(), axis=0).tolist() == [[0, 0], [80, 0], [80, 50]]
     assert [told(one) - told(pictures[0]) for one in pictures[1:]] == [{"no vehicle may enter"}, {"priority"}]
+
+
+def test_the_legend_lies_below_all_else_also_where_the_area_is_low(tmp_path: Path) -> None:
+    low = "area.polygon_m=[[0, 0], [400, 0], [400, 8], [0, 8]]"
+    flight = Fleet(BRIEF, folder=tmp_path, overrides=("mission.deadline_s=5", low), record=True).run()
+    picture = MissionPicture(secondlook.load(flight.folder), SMALL_PX).at(5.0)
+    (legend,) = picture.legends
+    for axes in picture.axes:  # the scale of colours among them
+        for label in (axes.xaxis.label, *axes.get_xticklabels()):
+            assert label.get_window_extent().y0 >= legend.get_window_extent().y1 - 1, label.get_text()
+
+
+def test_no_two_vehicles_look_alike(tmp_path: Path) -> None:
+    flight = Fleet(
+        "wide", folder=tmp_path, overrides=("mission.deadline_factor=null", "mission.deadline_s=2"), record=True
+    ).run()
+    (legend,) = MissionPicture(secondlook.load(flight.folder), SMALL_PX).at(1.0).legends
+    looks = [(str(one.get_color()), str(one.get_marker())) for one in legend.get_lines()]
+    assert len(looks) > 10 + 2  # of strips are the last two
+    assert len(set(looks[:-2])) == len(looks[:-2])
 
 
 def test_the_picture_at_a_time_is_the_same_whatever_was_drawn_before(brief_run: Path) -> None:
