@@ -6,6 +6,7 @@ import re
 import struct
 import subprocess
 import tempfile
+from collections.abc import Iterable
 from pathlib import Path
 from types import TracebackType
 
@@ -82,14 +83,14 @@ class RecordingViewer:
     """Use as a context, which the viewer does not outlive, even if this process is killed. It listens on this machine
     only, on ports that the system picks.
 
-    With `web` there is a `page` for a browser; else a window opens, with `at_s` paused at that simulated time. Raises
-    ViewerError where that is not to be had.
+    `recordings`: one, or the parts of one. With `web` there is a `page` for a browser; else a window opens, with `at_s`
+    paused at that simulated time. Raises ViewerError where that is not to be had.
     """
 
-    def __init__(self, recording: Path, *, web: bool, at_s: float | None = None) -> None:
+    def __init__(self, recordings: Iterable[Path], *, web: bool, at_s: float | None = None) -> None:
         folder = Path(tempfile.mkdtemp(prefix="secondlook-view-"))
         self.log = folder / "viewer.txt"
-        command = [PROGRAM, str(recording.resolve()), *(WEB if web else WINDOW), *BIND]
+        command = [PROGRAM, *(str(one.resolve()) for one in recordings), *(WEB if web else WINDOW), *BIND]
         self.process = start(command, self.log, subprocess.DEVNULL)
         self._guard = guard(self.process, folder)
         self._page: WebPage | None = None

@@ -5,8 +5,8 @@ from __future__ import annotations
 import contextlib
 import os
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -34,15 +34,13 @@ def view(
     """Open the recording of a run in Rerun. Ends with the window, or with Ctrl-C."""
     if web and at is not None:
         raise UserError("--at: not allowed beside --web; a browser's page begins where it chooses")
-    recording = _recording(run)
+    recordings = _recordings(run)
     try:
         if not web:
             check_display()
-        with (
-            contextlib.suppress(KeyboardInterrupt),
-            _whole(recording) as whole,
-            _opened(whole, web=web, at_s=at) as viewer,
-        ):
+        with contextlib.suppress(KeyboardInterrupt), ExitStack() as stack:
+            whole = [stack.enter_context(_whole(one)) for one in recordings]
+            viewer = stack.enter_context(_opened(whole, web=web, at_s=at))
             if web:
                 typer.echo(f"The mission is shown, until Ctrl-C, at\n{viewer.page}")
             viewer.wait()
@@ -50,22 +48,32 @@ def view(
         raise UserError(str(error)) from error
 
 
-def _opened(recording: Path, *, web: bool, at_s: float | None) -> RecordingViewer:
+def _opened(recordings: Iterable[Path], *, web: bool, at_s: float | None) -> RecordingViewer:
     with shown_progress("view", begins="opening"):
-        return RecordingViewer(recording, web=web, at_s=at_s)
+        return RecordingViewer(recordings, web=web, at_s=at_s)
 
 
-def _recording(run: Path) -> Path:
-    recording = run / "mission.rrd"
+def _recordings(run: Path) -> list[Path]:
+    """The run's recording: its parts, of which each but the first is of a recorder that was started again."""
     check_run_folder(run)
+    later = sorted(run.glob("mission-*.rrd"), key=lambda one: (len(one.name), one.name))
+    parts = [run / "mission.rrd", *later]
+    holding = [one for one in parts if _holds_something(one)]
+    if not holding:
+        why = "its recorder was killed before it had written anything, or is about to write"
+        raise UserError(f"{parts[0]}: holds nothing yet: {why}")
+    return holding
+
+
+def _holds_something(recording: Path) -> bool:
     try:
         if is_empty(recording):
-            why = "its recorder was killed before it had written anything, or is about to write"
-            raise UserError(f"{recording}: holds nothing yet: {why}")
+            return False
         if is_recording(recording):
-            return recording
+            return True
     except FileNotFoundError as error:
-        raise UserError(f"{run}: holds no mission.rrd; must be the folder of a run without --no-record") from error
+        told = f"{recording.parent}: holds no {recording.name}; must be the folder of a run without --no-record"
+        raise UserError(told) from error
     except OSError as error:
         raise UserError(f"{recording}: cannot be read: {error.strerror}") from error
     raise UserError(f"{recording}: is not a recording; must be as the run wrote it")
@@ -80,7 +88,7 @@ def _whole(recording: Path) -> Iterator[Path]:
     run = recording.parent
     # A recorder that still writes would go on writing into the file that is no longer there.
     if (run / "summary.json").exists() and os.access(run, os.W_OK):
-        repaired = recording.with_name("mission.rrd.repaired")
+        repaired = recording.with_name(f"{recording.name}.repaired")
         _repair(recording, repaired)
         repaired.replace(recording)
         typer.echo(f"{recording} had lost its end; it is repaired, with all that was written", err=True)

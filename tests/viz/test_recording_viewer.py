@@ -35,7 +35,7 @@ def test_the_window_shows_the_recording(
     recording: Path, messages: list[Received], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(recording_viewer, "WINDOW", ("--headless", "--window-size", "800x500"))
-    with RecordingViewer(recording, web=False) as viewer:
+    with RecordingViewer([recording], web=False) as viewer:
         listening = LISTENING.search(viewer.log.read_text())
         assert listening
         client = ViewerClient.connect(f"rerun+http://{listening[1]}/proxy")
@@ -55,13 +55,13 @@ def test_the_window_shows_the_recording(
 @pytest.mark.usefixtures("drawable")
 def test_the_window_opens_at_a_moment(recording: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(recording_viewer, "WINDOW", ("--headless", "--window-size", "800x500"))
-    with RecordingViewer(recording, web=False, at_s=12.5) as viewer:
+    with RecordingViewer([recording], web=False, at_s=12.5) as viewer:
         client = ViewerClient.connect(server_url(viewer.process, viewer.log))
         wait_until(lambda: [one.current_time for one in client.get_state().recordings] == [12_500_000_000])
 
 
 def test_the_page_is_served_on_this_machine_alone(recording: Path) -> None:
-    with RecordingViewer(recording, web=True) as viewer:
+    with RecordingViewer([recording], web=True) as viewer:
         with urllib.request.urlopen(viewer.page, timeout=PATIENCE_S) as answer:
             assert b"<html" in answer.read()
         connections = psutil.Process(viewer.process.pid).net_connections("inet")
@@ -75,7 +75,7 @@ def test_the_viewer_does_not_outlive_a_killed_command(recording: Path) -> None:
     program = f"""
 from pathlib import Path
 from viz.recording_viewer import RecordingViewer
-with RecordingViewer(Path({str(recording)!r}), web=True) as viewer:
+with RecordingViewer([Path({str(recording)!r})], web=True) as viewer:
     print(viewer.process.pid, viewer.log.parent, flush=True)
     viewer.wait()
 """
@@ -91,4 +91,4 @@ with RecordingViewer(Path({str(recording)!r}), web=True) as viewer:
 def test_a_viewer_that_does_not_start_is_told(recording: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(recording_viewer, "WINDOW", ("--no-such-option",))
     with pytest.raises(ViewerError, match=r"^the viewer does not start: "):
-        RecordingViewer(recording, web=False)
+        RecordingViewer([recording], web=False)

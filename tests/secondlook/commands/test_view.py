@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 import urllib.request
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from urllib.error import URLError
@@ -127,6 +127,36 @@ def test_a_recording_that_holds_its_first_words_alone_is_refused(
     recording.write_bytes(recording.read_bytes()[:100])
     assert run_here(monkeypatch, str(brief_copy), "--web") == 2
     assert capsys.readouterr().err.startswith(f"{recording}: holds nothing yet: ")
+
+
+def test_the_parts_of_recorders_that_were_started_again_are_shown_with_the_first(
+    brief_copy: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = (brief_copy / "mission.rrd").read_bytes()
+    for number, held in ((2, whole), (3, whole[:100]), (10, whole)):
+        (brief_copy / f"mission-{number}.rrd").write_bytes(held)
+    shown: list[list[str]] = []
+
+    class Shows:
+        page = "http://127.0.0.1/"
+
+        def __init__(self, recordings: Iterable[Path], *, web: bool, at_s: float | None) -> None:
+            shown.append([one.name for one in recordings])
+
+        def __enter__(self) -> Shows:
+            return self
+
+        def __exit__(self, *_: object) -> None:
+            pass
+
+        def wait(self) -> None:
+            pass
+
+    monkeypatch.setattr("secondlook.commands.view.RecordingViewer", Shows)
+    for named in (["mission.rrd", "mission-2.rrd", "mission-10.rrd"], ["mission-2.rrd", "mission-10.rrd"]):
+        cli.app_for(["view"])(["view", str(brief_copy), "--web"], standalone_mode=False)
+        assert shown.pop() == named
+        (brief_copy / "mission.rrd").write_bytes(whole[:100])  # the first was killed before it had written anything
 
 
 def test_without_a_display_it_says_what_helps(

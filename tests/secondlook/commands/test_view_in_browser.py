@@ -16,7 +16,7 @@ PIXELS = 2_000  # of the map, at the least; the page without a mission has none
 
 def test_the_page_shows_the_mission(browser: Browser, brief_run: Path) -> None:
     with (
-        RecordingViewer(brief_run / "mission.rrd", web=True) as viewer,
+        RecordingViewer([brief_run / "mission.rrd"], web=True) as viewer,
         visit(browser, f"{viewer.page}&renderer=webgl", width=600, height=400) as seen,
     ):
         deadline = time.monotonic() + PATIENCE_S
