@@ -6,7 +6,7 @@ Imports nothing of the project before a fixture is used: every pytest run where 
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -51,6 +51,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     if "secondlook_bus" in metafunc.fixturenames and _wanted_bus(metafunc.definition) == _BOTH:
         metafunc.parametrize("secondlook_bus", _BUSES)
     if "storm" in metafunc.fixturenames:
+        _check_storms(metafunc.definition)
         numbers = _numbers_of_storms(metafunc.definition)
         metafunc.parametrize("storm", numbers, indirect=True, ids=[f"storm-{number}" for number in numbers])
 
@@ -153,10 +154,28 @@ def _wanted_bus(node: pytest.Item | pytest.Collector) -> str:
     return bus
 
 
+def _check_storms(node: pytest.Item | pytest.Collector) -> None:
+    """Refuses what a mark `storm` cannot say."""
+    mark = node.get_closest_marker("storm")
+    if mark is None:
+        return
+    named = {"scenario"} if mark.args else set()
+    unknown = sorted(named & mark.kwargs.keys()) + sorted(mark.kwargs.keys() - {"scenario", "seeds", "overrides"})
+    if unknown or len(mark.args) > 1:
+        what = unknown[0] if unknown else repr(mark.args[1])
+        allowed = "must be a scenario, and by name seeds and overrides, each once"
+        raise pytest.UsageError(f"{node.nodeid}: mark storm: {what} is not allowed; {allowed}")
+    if mark.kwargs.get("overrides") and not (mark.args or mark.kwargs.get("scenario")):
+        why = "not allowed without a scenario, as fleets are drawn then"
+        raise pytest.UsageError(f"{node.nodeid}: mark storm: overrides: {why}")
+
+
 def _numbers_of_storms(node: pytest.Item | pytest.Collector) -> list[int]:
     mark = node.get_closest_marker("storm")
     seeds = _STORMS if mark is None else mark.kwargs.get("seeds", _STORMS)
-    numbers = list(range(1, seeds + 1)) if isinstance(seeds, int) else list(seeds)
+    numbers = (
+        list(range(1, seeds + 1)) if isinstance(seeds, int) else list(seeds) if isinstance(seeds, Iterable) else []
+    )
     if not numbers or not all(isinstance(one, int) and one >= 0 for one in numbers):
         allowed = "must be how many, at least 1, or a list of numbers of storms"
         raise pytest.UsageError(f"{node.nodeid}: mark storm: seeds {seeds!r} is not allowed; {allowed}")

@@ -106,6 +106,6 @@ class CheckedSonar:
         if wrong.any():
             place_m, given = np.broadcast_to(range_m, shape)[wrong].flat[0], p_detect[wrong].flat[0]
             raise ValueError(
-                f"{self._told} gives a P_d of {given:g} at a range of {place_m:g} m; must be 0 to {HIGHEST_P_DETECT}"
+                f"{self._told} gives a P_d of {given} at a range of {place_m:g} m; must be 0 to {HIGHEST_P_DETECT}"
             )
         return p_detect

@@ -100,6 +100,11 @@ def timeline(events: Iterable[NodeEvent], routing: Routing) -> tuple[Happening, 
     return tuple(sorted(found, key=lambda one: (one.at_ms, one.node_id)))
 
 
+def _in_s(time_ms: int) -> str:
+    """A time as people give it."""
+    return f"{time_ms / 1000:.12g} s"
+
+
 def _timeline_of(node_id: str, events: list[NodeEvent], routing: Routing) -> list[Happening]:
     node = routing.nodes.get(node_id)
     able = [one.node_id for one in routing.roster if one.role not in UNTOUCHABLE]
@@ -109,7 +114,9 @@ def _timeline_of(node_id: str, events: list[NodeEvent], routing: Routing) -> lis
     present, incarnation, start, last_ms = not isinstance(events[0], Join), 0, 0, 0
     for event in events:
         if event.at_ms <= last_ms:
-            raise ValueError(f"{node_id}: an event at {event.at_ms} ms is not allowed; must be after {last_ms} ms")
+            raise ValueError(
+                f"{node_id}: an event at {_in_s(event.at_ms)} is not allowed; must be after {_in_s(last_ms)}"
+            )
         last_ms = event.at_ms
         match event:
             case Kill():
@@ -118,7 +125,8 @@ def _timeline_of(node_id: str, events: list[NodeEvent], routing: Routing) -> lis
             case Freeze():
                 fits, change, wanted = present, Change.FREEZE, "there"
                 if event.until_ms <= event.at_ms:
-                    raise ValueError(f"{node_id}: must be thawed after {event.at_ms} ms, not at {event.until_ms} ms")
+                    thawed = f"must be thawed after {_in_s(event.at_ms)}, not at {_in_s(event.until_ms)}"
+                    raise ValueError(f"{node_id}: {thawed}")
                 last_ms = event.until_ms
             case Join():
                 fits, change, wanted = not present, Change.JOIN, "absent"

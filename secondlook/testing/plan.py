@@ -118,7 +118,7 @@ class Repeat(_Struck):
     """Messages come a second time."""
 
     what: Literal["repeat"]
-    after_s: Duration
+    after_s: Duration = 1.0
 
 
 class Delay(_Struck):
@@ -132,7 +132,7 @@ class Reorder(_Struck):
     """Messages come later by up to so much."""
 
     what: Literal["reorder"]
-    within_s: Duration
+    within_s: Duration = 1.0
 
 
 AnyTrouble = Annotated[

@@ -42,7 +42,9 @@ def test_an_answer_in_order_is_passed_on() -> None:
     assert answer.tolist() == [0.0, 0.5, 0.999]
 
 
-@pytest.mark.parametrize(("wrong", "told"), [(1.0, "1"), (0.9991, "0.9991"), (-0.01, "-0.01"), (float("nan"), "nan")])
+@pytest.mark.parametrize(
+    ("wrong", "told"), [(1.0, r"1\.0"), (0.9990001, r"0\.9990001"), (-0.01, "-0.01"), (float("nan"), "nan")]
+)
 def test_one_value_out_of_order_is_told_with_its_range(wrong: float, told: str) -> None:
     sonar = CheckedSonar(Answers(0.5, wrong, 0.5), "primary")
     with pytest.raises(ValueError, match=rf"Answers, gives a P_d of {told} at a range of 20 m; must be 0 to 0\.999$"):

@@ -127,10 +127,19 @@ def test_marks_that_make_no_sense_and_a_room_in_the_way_are_told(tmp_path: Path)
     for number, mark in enumerate(told):
         test = f"import pytest\n@pytest.mark.fleet({mark})\ndef test_it(fleet):\n    pass\n"
         (tmp_path / f"test_{number}.py").write_text(test)
-    told["seeds=0"] = "mark storm: seeds 0 is not allowed; must be how many, at least 1, or a list of numbers of storms"
-    (tmp_path / "test_storm.py").write_text(
-        "import pytest\n@pytest.mark.storm(seeds=0)\ndef test_it(storm):\n    pass\n"
-    )
+    seeds = "is not allowed; must be how many, at least 1, or a list of numbers of storms"
+    allowed = "is not allowed; must be a scenario, and by name seeds and overrides, each once"
+    of_storms = {
+        "seeds=0": f"mark storm: seeds 0 {seeds}",
+        "seeds=2.5": f"mark storm: seeds 2.5 {seeds}",
+        "seed=4": f"mark storm: seed {allowed}",
+        "'bay.yaml', 3": f"mark storm: 3 {allowed}",
+        "overrides={'seed': 4}": "mark storm: overrides: not allowed without a scenario, as fleets are drawn then",
+    }
+    for number, mark in enumerate(of_storms):
+        test = f"import pytest\n@pytest.mark.storm({mark})\ndef test_it(storm):\n    pass\n"
+        (tmp_path / f"test_storm_{number}.py").write_text(test)
+    told |= of_storms
     printed = pytest_in(tmp_path, "--continue-on-collection-errors")
     assert [sentence for sentence in told.values() if sentence not in printed] == []
     (tmp_path / "planner.py").write_text("")

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import inspect
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import pytest
 from flights import BRIEF
@@ -27,7 +28,8 @@ from secondlook.testing import (
     assert_one_strip_at_a_time,
 )
 from secondlook.testing.flight import lives
-from secondlook.testing.plan import load_plan, make_plan
+from secondlook.testing.plan import AnyTrouble, load_plan, make_plan
+from secondlook.testing.trouble import Trouble
 
 MakeFleet = Callable[..., Fleet]
 
@@ -136,6 +138,16 @@ class TestMessages:
         assert flight.messages("coord/strip/*") == []
         lost = [one for what in ("hotspot/*", "coverage/*", "plan") for one in flight.messages(f"agent/*/{what}")]
         assert flight.summary["dropped"] == {"lost by a fault": len(lost)}
+
+    def test_a_plan_asks_for_what_the_methods_ask_for_and_for_when(self) -> None:
+        for entry in get_args(get_args(AnyTrouble)[0]):
+            asked = {name for name, field in entry.model_fields.items() if field.is_required()} - {"what"}
+            for what in get_args(entry.model_fields["what"].annotation):
+                arguments = inspect.signature(getattr(Trouble, what)).parameters
+                wanted = {name for name, one in arguments.items() if one.default is one.empty} - {"self"}
+                assert wanted <= asked <= wanted | {"at_s", "from_s"}, what
+                for name in entry.model_fields.keys() - asked - {"what", "from_s", "for_s"}:
+                    assert entry.model_fields[name].default == arguments[name].default, (what, name)
 
     @pytest.mark.parametrize(
         ("schedule", "later_ms"),
