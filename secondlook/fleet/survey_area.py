@@ -114,6 +114,11 @@ def lays_tracks(vehicle: SurveyVehicle) -> Iterator[None]:
 
 def check_tracks(name: str, vehicle: SurveyVehicle, tracks: int) -> None:
     """Raises UserError for no track at all, and for more than a plan can tell of."""
+    if not tracks and vehicle.spacing not in SPACING.ours:
+        raise UserError(
+            f"vehicles.{name}.spacing: {vehicle.spacing} lays no track that crosses the area and has room beside "
+            "ground to keep out of; must lay one"
+        )
     if not tracks:
         raise UserError(
             f"vehicles.{name}: no track of its survey has room beside ground to keep out of; must have less of "
