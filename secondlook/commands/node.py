@@ -246,7 +246,8 @@ def recorder(
     mission = load_scenario(scenario, set_ or (), seed)
     link = _link(mission, connect, None, run, insecure, tls_ca, tls_cert, tls_key, wait)
     build_fleet(mission, record=False)  # refuses what makes none, before there is a folder
-    raise typer.Exit(run_recorder(mission, link, run_folder(out, mission.name)))
+    with run_folder(out, mission.name) as folder:
+        raise typer.Exit(run_recorder(mission, link, folder))
 
 
 def _supervise_if_asked(name: str, restart: Restart) -> None:

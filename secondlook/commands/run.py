@@ -161,7 +161,10 @@ def run(
             refuse(expected)
     drive = Lockstep() if real_time is None else ByWallClock(real_time, keep_going, mission.coordinator.lost_after_s)
     gc.freeze()  # what is loaded by now stays: the collector need not go through it again and again
-    with live_view(lambda: run_folder(out, mission.name), live=live, web=web) as (folder, pipe):
+    with (
+        contextlib.ExitStack() as kept,
+        live_view(lambda: kept.enter_context(run_folder(out, mission.name)), live=live, web=web) as (folder, pipe),
+    ):
         if expected is not None:
             tell_expected(expected, quiet=as_json)
         with progress_display(mission.name, quiet=as_json) as progress:

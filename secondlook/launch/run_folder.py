@@ -13,22 +13,29 @@ from secondlook.errors import UserError
 from secondlook.files import CannotWriteError, make_folder, own_folder
 
 
-def run_folder(out: Path | None, name: str) -> Path:
+@contextmanager
+def run_folder(out: Path | None, name: str) -> Iterator[Path]:
     """The folder for the files of a run: `out`, new or empty, or a new one in `runs`, named after scenario and time.
+    Within it no other run goes to the same. Raises UserError."""
+    out = _new_among_runs(name) if out is None else out
+    with own_new_folder(out):
+        yield out
 
-    Raises UserError.
-    """
-    if out is None:
-        stamp = datetime.now().astimezone().strftime("%Y%m%d-%H%M%S")
-        out = next(
-            path
-            for path in (
-                Path("runs") / f"{name}-{stamp}{suffix}" for suffix in ("", *(f"-{n}" for n in range(2, 1000)))
-            )
-            if not path.exists()
-        )
-    make_new_folder(out)
-    return out
+
+def _new_among_runs(name: str) -> Path:
+    runs, number = Path("runs"), 1
+    make_folder(runs)
+    name += datetime.now().astimezone().strftime("-%Y%m%d-%H%M%S")
+    while True:
+        out = runs / (name if number == 1 else f"{name}-{number}")
+        try:
+            out.mkdir()
+        except FileExistsError:  # of a run that began in the same second
+            number += 1
+            continue
+        except OSError:
+            make_folder(out)  # says why it cannot be
+        return out
 
 
 def make_new_folder(out: Path, unless: str = "") -> None:
