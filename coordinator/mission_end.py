@@ -55,18 +55,21 @@ class MissionEnd:
         lacking = [] if surveying else self._fleet.lacking(now_ms)
         self._ask(lacking, now_ms)
         returning = any(one.is_returning for one in self._fleet.vehicles.values())
+        given_up = ", ".join(name for name, one in self._fleet.primaries.items() if one.is_given_up)
+        given_up = f"; given up before the end of its survey: {given_up}" if given_up else ""
         is_busy = bool(left or self._strips.awaited or surveying or lacking or returning)
         if not is_busy and not self._cut_is_left(now_ms):
             early = ", ".join(name for name, one in self._fleet.primaries.items() if one.ended_early)
             cut_short = f"; the survey of {early} has ended early, as the battery lasted for no more" if early else ""
-            reason = f"every primary has finished and no strip is left{cut_short}"
+            have_finished = "" if given_up else "every primary has finished and "
+            reason = f"{have_finished}no strip is left{cut_short}{given_up}"
         elif goal := self._goal.find(now_ms):
             reason = f"{GOAL_REACHED}: {goal}, {len(left)} strips are left"
         elif now_ms >= self.deadline_ms():
             by_the_clock = math.isfinite(self._config.deadline_s)
             end = "the deadline" if by_the_clock else f"{self._config.deadline_factor:g} times the last primary's end"
             cut_short = ", the survey is not finished" if surveying else ""
-            reason = f"{end} is reached{cut_short}, {len(left)} strips are left"
+            reason = f"{end} is reached{cut_short}, {len(left)} strips are left{given_up}"
         else:
             return
         self._strips.leave_all(now_ms)

@@ -208,6 +208,11 @@ class KnownVehicle:
         return self.state is not None and (self.state.mode.has_ended or self.state.mode.is_out_of_work)
 
     @property
+    def is_given_up(self) -> bool:
+        """Whether the mission goes on without the rest of its survey, see `give_up`."""
+        return self.finished_ms is not None and self._surveyed_in is None
+
+    @property
     def is_returning(self) -> bool:
         """Whether it is on its way home, as far as is known."""
         return not self.lost and self.state is not None and self.state.mode is Mode.RETURNING

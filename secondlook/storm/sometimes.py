@@ -95,7 +95,7 @@ class Seen:
         self.primaries = set(flight.scenario.survey_vehicles)
         self._modems = {one.node_id for one in flight.routing.roster if one.role is Role.MODEM}
         self.is_given_up = any(
-            one.finished_ms is not None and not one.is_finished
+            one.is_given_up
             for beside in witness.coordinators
             if beside.node.has_begun
             for one in beside.node.fleet.primaries.values()
@@ -218,7 +218,7 @@ REFUSALS: Mapping[str, str] = MappingProxyType(
 DISK_FULL = "a mission fails as its disk is full"
 ENDINGS: Mapping[str, str] = MappingProxyType(
     {
-        "the mission ends with nothing left": "every primary has finished and no strip is left",
+        "the mission ends with nothing left": "no strip is left",
         "the mission ends with its goal": GOAL_REACHED,
         "the mission ends by the clock": "the deadline is reached",
         "the mission ends by the last primary's end": " times the last primary's end is reached",
