@@ -37,13 +37,14 @@ _REMEDY = "must be moved away, or another folder given"
 class Identity:
     """Whose memory it is, and of which run and program: all of it must be the same for it to be taken up.
 
-    The names of the fields are what a sentence calls them.
+    The names of the fields are what a sentence calls them. Of several that differ the first is told: the digest of a
+    scenario hangs on its seed.
     """
 
     node: str
     run: str
-    scenario: str
     seed: str
+    scenario: str
     clock: str
     version: str
     schema: str

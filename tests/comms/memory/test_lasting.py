@@ -33,7 +33,7 @@ from comms.said.topics import CONTACT
 from secondlook.fleet.build import Fleet, build_fleet
 from secondlook.scenario import load_scenario
 
-OURS = Identity("node", "toy", "0" * 64, "1", "wall", "0.1.0", "2")
+OURS = Identity("node", "toy", "1", "0" * 64, "wall", "0.1.0", "2")
 TOY = Routing(ROSTER)
 Said = list[tuple[str, bytes]]
 

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from comms.errors import NodeError, StoreRefusedError
 from comms.memory.store import Entry, Identity, Past, Store
 
-OURS = Identity("alpha", "toy", "0" * 64, "1", "wall", "0.1.0", "2")
+OURS = Identity("alpha", "toy", "1", "0" * 64, "wall", "0.1.0", "2")
 ENTRIES = st.lists(st.tuples(st.integers(0, 2**40), st.binary(max_size=300), st.integers(0, 2**32 - 1)), max_size=12)
 
 
@@ -99,6 +99,13 @@ def test_that_of_another_is_refused(tmp_path: Path, name: str) -> None:
     assert said == f"is of another {name}, {shown} and not other; must be moved away, or another folder given"
     with opened(tmp_path) as store:
         assert store.past is not None
+
+
+def test_of_another_seed_the_seed_is_told_although_the_scenario_is_another_by_it(tmp_path: Path) -> None:
+    with opened(tmp_path):
+        pass
+    said = refusal(tmp_path, replace(OURS, seed="8", scenario="f" * 64))
+    assert said == "is of another seed, 1 and not 8; must be moved away, or another folder given"
 
 
 def test_that_of_a_mission_that_is_over_is_refused(tmp_path: Path) -> None:

@@ -17,6 +17,8 @@ from fleets import Notes
 from flights import BRIEF, events, flight, has_ended, until
 from spread import SpreadFleet, kill, loopback_endpoint, lost_of_what_is_kept, spread_fleet
 
+from comms.drive import identity_of
+from comms.memory.store import Store
 from comms.node import Received
 from comms.runner import Intake
 from comms.said.announcement import ClockMode
@@ -177,6 +179,17 @@ def test_what_is_not_ours_is_refused_before_anything_else(fleet: SpreadFleet) ->
     assert world.ends() == 2
     assert re.fullmatch(r"--state state/world\.sqlite: is cut short or damaged: .*; must be moved away.*\n", world.said)
     assert (fleet.folder / "state" / "world.sqlite").read_bytes() == b"SQLite format 3"
+
+
+def test_a_memory_of_another_seed_is_refused_as_such(fleet: SpreadFleet) -> None:
+    build = build_fleet(load_scenario(BRIEF, seed=7), record=True, mode=ClockMode.WALL)
+    run = build.run_info.scenario
+    Store(fleet.folder / "state", "world", identity_of("world", run, build.run_info)).close()
+    world = fleet.node("world", more=["--state", "state", "--seed", "8"])
+    assert world.ends() == 2
+    assert world.said == (
+        "--state state/world.sqlite: is of another seed, 7 and not 8; must be moved away, or another folder given\n"
+    )
 
 
 def test_a_supervisor_ends_with_its_process_and_that_with_it(fleet: SpreadFleet) -> None:
