@@ -18,7 +18,7 @@ from secondlook.commands.run import Anyway, check_factor, expected_of, refuse, t
 from secondlook.errors import UserError
 from secondlook.fleet.build import build_fleet
 from secondlook.fleet.nodes import COORDINATOR, WORLD
-from secondlook.launch.run_folder import run_folder
+from secondlook.launch.run_folder import folder_beside, run_folder
 from secondlook.launch.spread_fleet import Link, run_node, run_recorder, run_router
 from secondlook.launch.supervisor import Supervisor, starts_before
 from secondlook.scenario import Scenario, load_scenario
@@ -242,7 +242,7 @@ def recorder(
     """The recorder, which writes all files of a run; each start writes into a folder of its own."""
     _supervise_if_asked("recorder", restart)
     if out is not None and starts_before():
-        out = out.with_name(f"{out.name}-{starts_before() + 1}")
+        out = folder_beside(out, starts_before() + 1)
     mission = load_scenario(scenario, set_ or (), seed)
     link = _link(mission, connect, None, run, insecure, tls_ca, tls_cert, tls_key, wait)
     build_fleet(mission, record=False)  # refuses what makes none, before there is a folder

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import logging
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import datetime
@@ -36,6 +38,14 @@ def _new_among_runs(name: str) -> Path:
         except OSError:
             make_folder(out)  # says why it cannot be
         return out
+
+
+def folder_beside(out: Path, start: int) -> Path:
+    """The folder for the files of a later start, the second being 2, of what has written to `out`: OUT-2 and so on
+    beside it, or the next of these that is not there. `out` may be no more than a way there, such as `.`."""
+    there = Path(os.path.realpath(out)) if out.name in ("", "..") else out
+    paths = (there.parent / f"{there.name}-{number}" for number in itertools.count(start))
+    return next(path for path in paths if not os.path.lexists(path))
 
 
 def make_new_folder(out: Path, unless: str = "") -> None:

@@ -192,6 +192,16 @@ def test_a_memory_of_another_seed_is_refused_as_such(fleet: SpreadFleet) -> None
     )
 
 
+def test_a_recorder_into_the_folder_in_which_it_is_started_is_started_again(fleet: SpreadFleet) -> None:
+    (fleet.folder / "here").mkdir()
+    again = ["--out", ".", "--restart", "on-failure"]
+    recorder = fleet.node("recorder", more=again, before=["env", "--chdir", "here"])
+    assert until((fleet.folder / "here" / "scenario.yaml").exists)
+    os.kill(child_of(recorder.process.pid), signal.SIGKILL)
+    assert until((fleet.folder / "here-2" / "scenario.yaml").exists), recorder.said
+    assert recorder.said == "recorder: was killed by SIGKILL; it is started again, restart 1 of at most 6 in a row\n"
+
+
 def test_a_supervisor_ends_with_its_process_and_that_with_it(fleet: SpreadFleet) -> None:
     asked = fleet.router(1, "--restart", "on-failure")
     assert asked.says("listens on")
