@@ -3,6 +3,10 @@
 An SQLite database in WAL mode. What was committed is there after the process was killed at any moment; with `durable`
 also after the host has lost its power. A file is looked at on a copy before it is written to, so that one which is
 refused stays as it is, byte for byte.
+
+Of a WAL that was cut short SQLite takes what is whole, without a word. So a small file beside it has the number of
+steps, written after each is committed and before what was said in it goes out; a memory of fewer is refused. That file
+is not synced: after a loss of power it may be behind, never ahead of what was `durable`.
 """
 
 from __future__ import annotations
@@ -24,6 +28,7 @@ from comms.errors import NodeError, StoreRefusedError
 
 SUFFIX = ".sqlite"
 WAL = "-wal"  # what SQLite adds to the name of the file in which the newest commits lie
+STEPS = "-steps"  # what is added for that which has the number of steps
 _MADE_FOR = "PRAGMA user_version = 1"
 _TABLES = (
     "CREATE TABLE identity (name TEXT PRIMARY KEY, value TEXT NOT NULL)",
@@ -84,23 +89,26 @@ class Store:
     def __init__(self, folder: Path, name: str, identity: Identity, *, durable: bool = False) -> None:
         self.path = folder / f"{name}{SUFFIX}"
         self.past: Past | None = None
-        with self._in_words():
+        with self._in_words(), contextlib.ExitStack() as opened:
+            newest = Path(f"{self.path}{WAL}")
+            is_left = newest.exists()  # looked for first: another process makes the file before that
             if not self.path.exists():
+                if is_left:  # SQLite would put it into the new one
+                    raise self.refuse(f"is missing, but not what belongs to it, {newest.name}, which {_REMEDY}")
                 _create(self.path, identity)
-            self._lock = _locked(self.path)
-        try:
+            opened.enter_context(_locked(self.path))
             self.past = _read_copy(self.path, identity)
-            with self._in_words():
-                self._database = _connect(self.path)
-                self._database.execute(f"PRAGMA synchronous = {'FULL' if durable else 'NORMAL'}")
-        except BaseException:
-            self._lock.close()
-            raise
+            self._steps = 0 if self.past is None else self.past.steps + len(self.past.journal)
+            self._steps_file = opened.enter_context(Path(f"{self.path}{STEPS}").open("r+b", buffering=0))
+            self._database = _connect(self.path)
+            self._database.execute(f"PRAGMA synchronous = {'FULL' if durable else 'NORMAL'}")
+            self._files = opened.pop_all()
 
     def add(self, entry: Entry) -> None:
         """Remembers a step; raises NodeError where it cannot be written."""
         with self._as_failure():
             self._database.execute("INSERT INTO journal VALUES (?, ?, ?, ?, ?)", (*entry, entry.checksum))
+            self._count(entry.step + 1)
 
     def put(self, steps: int, state: bytes) -> None:
         """Puts a state in the place of the one before and of the journal. Raises NodeError."""
@@ -114,16 +122,21 @@ class Store:
         """The mission is over for this node: nobody is to take it up any more. Raises NodeError."""
         with self._as_failure():
             self._database.execute("INSERT OR REPLACE INTO identity VALUES ('over', '1')")
+            self._count(self._steps + 1)  # as if it were a step, which may be cut off as well
 
     def close(self) -> None:
         """Closes the file."""
         with contextlib.suppress(sqlite3.Error):
             self._database.close()
-        self._lock.close()
+        self._files.close()
 
     def refuse(self, why: str) -> StoreRefusedError:
         """The error that says why what is in it cannot be taken up."""
         return _refused(self.path, why)
+
+    def _count(self, steps: int) -> None:
+        self._steps = steps
+        os.pwrite(self._steps_file.fileno(), b"%020d\n" % steps, 0)  # all of it at once: of one length
 
     @contextmanager
     def _in_words(self) -> Iterator[None]:
@@ -137,8 +150,9 @@ class Store:
     def _as_failure(self) -> Iterator[None]:
         try:
             yield
-        except sqlite3.Error as error:
-            raise NodeError(f"{self.path}: {error}; must be a file that can be written") from error
+        except (OSError, sqlite3.Error) as error:
+            told = error.strerror if isinstance(error, OSError) else error
+            raise NodeError(f"{self.path}: {told}; must be a file that can be written") from error
 
 
 def _connect(path: Path) -> sqlite3.Connection:
@@ -162,7 +176,8 @@ def _create(path: Path, identity: Identity) -> None:
             database.executemany("INSERT INTO identity VALUES (?, ?)", values)
         finally:
             database.close()
-        with contextlib.suppress(FileExistsError):  # somebody else was faster
+        os.close(os.open(f"{path}{STEPS}", os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600))  # empty: none
+        with contextlib.suppress(FileExistsError):  # somebody else was faster, and writes their number at each step
             os.link(beside, path)
     finally:
         beside.unlink(missing_ok=True)
@@ -217,7 +232,20 @@ def _read(database: sqlite3.Connection, path: Path, identity: Identity) -> Past 
         if entry.step != place or entry.checksum != checksum:
             raise _damaged(path, f"its step {place} is missing or does not have its checksum")
         journal.append(entry)
+    there, taken = steps + len(journal), _steps_taken(path)
+    if there < taken:
+        raise _damaged(path, f"it holds {there} of the {taken} steps that were taken")
     return Past(steps, state, tuple(journal)) if journal or state is not None else None
+
+
+def _steps_taken(path: Path) -> int:
+    file = Path(f"{path}{STEPS}")
+    try:
+        return int(file.read_bytes().strip(b"\0\n") or b"0")
+    except FileNotFoundError:
+        raise _damaged(path, f"{file.name}, which belongs to it, is missing") from None
+    except ValueError:
+        raise _damaged(path, f"{file.name}, which belongs to it, holds no number") from None
 
 
 def _short(value: str) -> str:

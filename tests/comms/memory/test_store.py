@@ -148,17 +148,103 @@ def test_one_that_is_cut_short_is_refused(data: st.DataObject) -> None:
 
 @settings(max_examples=40, deadline=None)
 @given(data=st.data())
-def test_where_the_newest_commits_are_cut_off_those_before_are_there(data: st.DataObject) -> None:
+def test_where_the_newest_commits_are_cut_off_or_damaged_it_is_whole_or_refused(data: st.DataObject) -> None:
     with tempfile.TemporaryDirectory() as folder:
         there, left = Path(folder) / "there", Path(folder) / "left"
         with opened(there) as store:
             entries = remember(store, 30)
             killed(there, left)
         wal = left / "alpha.sqlite-wal"
-        os.truncate(wal, data.draw(st.integers(0, wal.stat().st_size)))
-        with opened(left) as store:
-            journal = () if store.past is None else store.past.journal
-        assert journal == entries[: len(journal)]
+        content = bytearray(wal.read_bytes())
+        if data.draw(st.booleans()):
+            content = content[: data.draw(st.integers(0, len(content) - 1))]
+        else:
+            content[data.draw(st.integers(0, len(content) - 1))] ^= data.draw(st.integers(1, 255))
+        wal.write_bytes(content)
+        try:
+            with opened(left) as store:
+                assert store.past == Past(0, None, entries)
+        except StoreRefusedError:
+            assert refusal(left).startswith("is cut short or damaged: ")
+
+
+def shortened(folder: Path, to: Path) -> Path:
+    """What is left where all of the newest commits are taken away."""
+    (killed(folder, to) / "alpha.sqlite-wal").unlink()
+    return to
+
+
+def test_without_the_newest_commits_it_is_refused_with_what_is_there_and_was(tmp_path: Path) -> None:
+    there = tmp_path / "there"
+    with opened(there) as store:
+        remember(store, 5)
+        new = shortened(there, tmp_path / "new")
+    with opened(there) as store:
+        remember(store, 3, first=5)
+        store.put(8, b"state")
+        later = shortened(there, tmp_path / "later")
+    with opened(there) as store:
+        store.end()
+        over = shortened(there, tmp_path / "over")
+    told = "is cut short or damaged: it holds {} of the {} steps that were taken; must be moved away, "
+    assert refusal(new) == told.format(0, 5) + "or another folder given"
+    assert refusal(later) == told.format(5, 8) + "or another folder given"
+    assert refusal(over) == told.format(8, 9) + "or another folder given"
+
+
+def test_a_snapshot_that_is_cut_off_is_no_loss(tmp_path: Path) -> None:
+    there = tmp_path / "there"
+    with opened(there) as store:
+        entries = remember(store, 5)
+    with opened(there) as store:
+        store.put(5, b"state")
+        left = shortened(there, tmp_path / "left")
+    with opened(left) as store:
+        assert store.past == Past(0, None, entries)
+
+
+@pytest.mark.parametrize("behind", [b"", b"00000000000000000004\n", bytes(21)])
+def test_their_number_may_be_behind_as_it_is_written_last(tmp_path: Path, behind: bytes) -> None:
+    with opened(tmp_path) as store:
+        entries = remember(store, 5)
+    (tmp_path / "alpha.sqlite-steps").write_bytes(behind)
+    with opened(tmp_path) as store:
+        assert store.past == Past(0, None, entries)
+        remember(store, 1, first=5)
+    assert (tmp_path / "alpha.sqlite-steps").read_bytes() == b"00000000000000000006\n"
+
+
+def test_without_their_number_it_is_refused(tmp_path: Path) -> None:
+    with opened(tmp_path) as store:
+        remember(store, 5)
+    number = tmp_path / "alpha.sqlite-steps"
+    assert number.stat().st_mode & 0o777 == 0o600
+    number.write_bytes(b"five")
+    told = "is cut short or damaged: alpha.sqlite-steps, which belongs to it, "
+    assert refusal(tmp_path) == f"{told}holds no number; must be moved away, or another folder given"
+    number.unlink()
+    number.mkdir()
+    with pytest.raises(StoreRefusedError, match=r"alpha\.sqlite: Is a directory; must be a file that can be written"):
+        Store(tmp_path, "alpha", OURS)
+    number.rmdir()
+    assert refusal(tmp_path) == f"{told}is missing; must be moved away, or another folder given"
+
+
+def test_a_new_one_is_not_made_of_what_another_has_left(tmp_path: Path) -> None:
+    there = tmp_path / "there"
+    with opened(there) as store:
+        remember(store, 5)
+        left = killed(there, tmp_path / "left")
+    (left / "alpha.sqlite").unlink()
+    assert refusal(left) == (
+        "is missing, but not what belongs to it, alpha.sqlite-wal, which must be moved away, or another folder given"
+    )
+    (left / "alpha.sqlite-wal").unlink()
+    with opened(left) as store:  # their number is no more than that of the one before
+        assert store.past is None
+        remember(store, 2)
+    with opened(left) as store:
+        assert store.past is not None
 
 
 @settings(max_examples=40, deadline=None)
