@@ -27,7 +27,7 @@ from secondlook.cli import main as secondlook_main
 from secondlook.errors import UserError
 from secondlook.launch.mission import RunOptions, run_mission
 from secondlook.launch.processes import RunFailedError
-from secondlook.launch.run_folder import log_to_file, run_folder
+from secondlook.launch.run_folder import log_to_file
 from secondlook.recorded.mission_files import NOT_FOR_PEOPLE
 from secondlook.scenario import load_scenario
 from tests.viz.recordings import rows
@@ -44,26 +44,6 @@ def told_s(folder: Path) -> float:
         return secondlook.load(folder).end_s
     except UserError:  # not there yet
         return 0.0
-
-
-def test_runs_that_begin_at_once_have_each_its_own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    with run_folder(None, "bay") as one, run_folder(None, "bay") as two, run_folder(None, "bay") as three:
-        assert sorted(path.name for path in Path("runs").iterdir()) == sorted({one.name, two.name, three.name})
-        assert len({one, two, three}) == 3
-    (given := tmp_path / "given").mkdir()
-    refused = pytest.raises(UserError, match=rf"^--out {given}: another process writes to it already; must be another")
-    with run_folder(given, "bay"), refused, run_folder(given, "bay"):
-        pass
-    with run_folder(given, "bay") as again:
-        assert again == given
-
-
-def test_where_no_runs_can_be_kept_that_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    Path("runs").write_text("")
-    with pytest.raises(UserError, match=r"^--out runs: is a file; must be a folder"), run_folder(None, "bay"):
-        pass
 
 
 @pytest.mark.parametrize("bus", ["local", "zenoh"])

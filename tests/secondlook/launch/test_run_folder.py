@@ -1,4 +1,4 @@
-"""Which folder is a run's."""
+"""Which folder is a run's, and that it is no other's."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from secondlook.launch.run_folder import folder_beside
+from secondlook.errors import UserError
+from secondlook.launch.run_folder import folder_beside, run_folder
 
 
 @pytest.mark.parametrize(
@@ -39,3 +40,23 @@ def test_a_folder_beside_is_one_that_is_not_there(tmp_path: Path) -> None:
     (tmp_path / "out-3").mkdir()
     (tmp_path / "out-4").symlink_to("nowhere")
     assert folder_beside(out, 3) == tmp_path / "out-5"
+
+
+def test_runs_that_begin_at_once_have_each_its_own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    with run_folder(None, "bay") as one, run_folder(None, "bay") as two, run_folder(None, "bay") as three:
+        assert sorted(path.name for path in Path("runs").iterdir()) == sorted({one.name, two.name, three.name})
+        assert len({one, two, three}) == 3
+    (given := tmp_path / "given").mkdir()
+    refused = pytest.raises(UserError, match=rf"^--out {given}: another process writes to it already; must be another")
+    with run_folder(given, "bay"), refused, run_folder(given, "bay"):
+        pass
+    with run_folder(given, "bay") as again:
+        assert again == given
+
+
+def test_where_no_runs_can_be_kept_that_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("runs").write_text("")
+    with pytest.raises(UserError, match=r"^--out runs: is a file; must be a folder"), run_folder(None, "bay"):
+        pass
