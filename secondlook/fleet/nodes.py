@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
+import numpy as np
+
 from comms.errors import NO_FAILURES, NodeError
 from comms.keys import HostSpec
 from comms.runner import failure_of
@@ -70,9 +72,10 @@ class NodeSpec:
     config: Any
 
     def make(self) -> Any:
-        """The node itself; its module is imported only here."""
+        """The node itself; its module is imported only here. A user's own sets for itself which errors numpy raises."""
         module, name = self.factory.split(":")
-        return getattr(import_module(module), name)(self.config)
+        with np.errstate():
+            return getattr(import_module(module), name)(self.config)
 
 
 def node_spec(role: Role, config: Any, own: str | None = None) -> NodeSpec:

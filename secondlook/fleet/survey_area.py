@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
 
+import numpy as np
+
 from comms.errors import NO_FAILURES, in_words
 from comms.said.messages import MOST_TRACKS
 from planner.first_plan import FirstPlan, best_heading, first_plan
@@ -103,7 +105,8 @@ class SpacingFailedError(UserError):
 def lays_tracks(vehicle: SurveyVehicle) -> Iterator[None]:
     """Within it the vehicle's spacing planner lays tracks. Raises SpacingFailedError where one of the user's fails."""
     try:
-        yield
+        with np.errstate():
+            yield
     except NO_FAILURES:
         raise
     except BaseException as error:

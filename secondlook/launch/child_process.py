@@ -14,6 +14,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any
 
+import numpy as np
+
 from comms.drive import Drive, Setup
 from comms.errors import NodeError, one_line
 from comms.keys import HostSpec
@@ -63,7 +65,8 @@ def receive_setup(pipe: IO[bytes]) -> ChildSetup:
     path, pickled = pickle.loads(pipe.read(size))
     # Behind our own path, so that nothing there can stand in a room's way.
     sys.path.extend(entry for entry in path if entry not in sys.path)
-    setup = pickle.loads(pickled)
+    with np.errstate():  # modules of the user's are imported, which may have numpy raise more errors than we do
+        setup = pickle.loads(pickled)
     assert isinstance(setup, ChildSetup)
     return setup
 

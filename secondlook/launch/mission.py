@@ -12,8 +12,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
+
 from comms.drive import Drive, Setup
-from comms.errors import FleetError, NodeError, RunawayError
+from comms.errors import FleetError, NodeError, RunawayError, in_words
 from comms.lockstep.drive import Lockstep
 from comms.node import Listener, Node
 from comms.result import BusResult, Ending
@@ -88,6 +90,7 @@ class RunOptions:
     lasts: bool = True
 
 
+@np.errstate(all="warn", under="ignore")  # numpy's defaults, whatever the caller has set for code of its own
 def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
     """Runs the mission and returns summary.json's content.
 
@@ -140,13 +143,18 @@ def run_in_passing(
     scenario: Scenario, *, progress: Progress | None = None, watch: Watch | None = None
 ) -> dict[str, Any]:
     """The same on the local bus without recording, its files in a folder that is gone afterwards. Raises RunFailedError
-    for all that keeps it from ending well, a full disk for one."""
+    for all that keeps it from ending well, a full disk for one, or what nobody has foreseen: of many missions the
+    others are flown all the same."""
     try:
         with passing_folder() as folder:
             options = RunOptions(folder, bus="local", record=False, progress=progress, watch=watch, lasts=False)
             return run_mission(scenario, options)
+    except RunFailedError:
+        raise
     except (UserError, OSError) as error:
         raise RunFailedError(str(error)) from error
+    except Exception as error:
+        raise RunFailedError(f"the mission broke off: {in_words(error)}") from error
 
 
 def warn_of(summary: Mapping[str, Any]) -> None:

@@ -139,7 +139,7 @@ def _profile(value: object) -> object:
 def _made(text: str) -> object:
     """What a user's own class or function makes, as a profile's keys."""
     try:
-        made = PROFILE.maker(text)()
+        made = PROFILE.make(text)
         if not isinstance(made, dict):
             raise PlugInError(f"must make a profile's keys as a dict; it makes a {type(made).__name__}")
         return Profile.model_validate(made).model_dump(exclude_none=True)

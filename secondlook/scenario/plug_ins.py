@@ -13,6 +13,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, TextIO
 
+import numpy as np
+
 from comms.errors import NO_FAILURES, in_words
 from coordinator.allocate.allocators import ALLOCATORS
 from planner.profile_spacing import JointSpacing, ProfileSpacing
@@ -56,6 +58,12 @@ class PlugInKind:
         if match is None:
             raise PlugInError(f"must be {self._names()}")
         return self.checked(_import(match.group(1), match.group(2)), text)
+
+    def make(self, text: str, **arguments: object) -> Any:
+        """What the maker that `text` names makes of these arguments. Raises PlugInError, and whatever that raises."""
+        maker = self.maker(text)
+        with np.errstate():
+            return maker(**arguments)
 
     def checked(self, found: Any, text: str) -> Callable[..., Any]:
         """`found`, which is called `text`, as the maker of a plug-in; raises PlugInError where it cannot be one."""
@@ -105,7 +113,8 @@ def _import(module: str, name: str) -> Any:
         sys.path.append(here)
     _check_names(module, Path(here))
     try:
-        return getattr(import_module(module), name)
+        with np.errstate():  # which errors numpy raises there is not for us to take over
+            return getattr(import_module(module), name)
     except AttributeError:
         raise PlugInError(f"must be importable; {module} has no {name}") from None
     except NO_FAILURES:
@@ -165,7 +174,7 @@ def modules_in(text: str) -> set[str]:
 def made(kind: PlugInKind, text: str, **arguments: object) -> Any:
     """The plug-in that `text` names, made of these arguments. Raises UserError where there is none or that fails."""
     try:
-        found = kind.maker(text)(**arguments)
+        found = kind.make(text, **arguments)
         kind.check_made(found, text)
         return found
     except PlugInError as error:

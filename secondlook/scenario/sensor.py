@@ -80,7 +80,7 @@ def _bundled(value: object) -> object:
             "or package.module:Class of what makes one"
         )
     try:
-        made = CURVE.maker(value)()
+        made = CURVE.make(value)
     except PlugInError as error:
         raise refused(str(error)) from error
     except NO_FAILURES:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import cast
 
+from comms.errors import in_words
 from secondlook.engine.engine import do_all, own_processes
 from secondlook.engine.work_process import Lost
 from secondlook.errors import UserError
@@ -90,7 +91,7 @@ def fly_storms(
 
 
 def without_end(why: str) -> Violation:
-    """Of a storm that was not flown to its end: its process has died or was ended."""
+    """Of a storm that was not flown to its end: its process has died or was ended, or an error has ended it."""
     return Violation("ends", 0.0, "run", why)
 
 
@@ -105,7 +106,10 @@ def fly_number(scenario: Scenario | None, again: int, number: int) -> Outcome:
         plan = storm_of(scenario, number)
     except UserError as refused:  # the others are flown all the same
         return _unflown(Violation("a fleet is drawn", 0.0, "run", str(refused)))
-    return flown_again(plan, number, fly_storm(plan), again)
+    try:
+        return flown_again(plan, number, fly_storm(plan), again)
+    except Exception as error:  # that nobody has foreseen: the command that is told shows where it comes from
+        return _unflown(without_end(in_words(error)))
 
 
 def flown_again(plan: TroublePlan, number: int, outcome: Outcome, again: int) -> Outcome:

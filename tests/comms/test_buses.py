@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from fleets import BUSES, Bus, Notes, Scripted, fleet_that_talks, nav, say_nav, say_over, say_state, say_status, says
 
@@ -142,6 +143,21 @@ def test_a_node_that_raises_ends_the_run_with_a_sentence_that_names_it() -> None
     ):
         BUSES["local"]({"alpha": alpha}, notes)
     assert notes.closed == 1
+
+
+def test_which_errors_numpy_raises_a_node_sets_for_itself_alone(bus: Bus) -> None:
+    def set_all(now_ms: int) -> Step:
+        np.seterr(all="raise")
+        return Step()
+
+    def ask(now_ms: int) -> Step:
+        told.append(np.geterr())
+        return Step()
+
+    before, told = np.geterr(), list[object]()
+    world = Scripted(starts=lambda now_ms: Step(wake_ms=5), wakes=ask)
+    bus({"alpha": Scripted(starts=set_all), "world": world}, Notes())
+    assert (told, np.geterr()) == ([before], before)
 
 
 @pytest.mark.parametrize(

@@ -9,9 +9,11 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 from called import Call
 
+from planner.risk import risk_of_levels
 from secondlook.scenario import load_scenario
 
 OWN = """
@@ -372,3 +374,60 @@ def test_what_a_part_prints_is_not_among_what_a_command_tells(folder: Path, call
     code, out, err = called(name, "bay.yaml", *words, "--json", *(word for one in parts for word in ("--set", one)))
     assert (code, {*err.splitlines()}) == (0, {"hello"})
     assert json.loads(out)
+
+
+STRICT = """
+import numpy as np
+import own
+from vehicle_agent.survey import SurveyAgent
+
+np.seterr(all="raise")
+
+class Allocator(own.LastFirst):
+    def __init__(self):
+        np.seterr(all="raise")
+    def assign(self, situation):
+        np.seterr(all="raise")
+        return super().assign(situation)
+
+class Planner(own.Every60):
+    def decide(self, *asked):
+        np.seterr(all="raise")
+        return super().decide(*asked)
+
+class Agent(SurveyAgent):
+    pass
+
+def tent():
+    np.seterr(all="raise")
+    return own.tent()
+"""
+
+
+@pytest.mark.parametrize(
+    ("strict", "plain"),
+    [
+        ("coordinator.allocator=strict:Allocator", "coordinator.allocator=own:LastFirst"),
+        ("vehicles.primary.spacing=strict:Planner", "vehicles.primary.spacing=own:Every60"),
+        ("vehicles.primary.sensor={curve: 'strict:tent'}", "vehicles.primary.sensor={curve: 'own:tent'}"),
+        ("vehicles.primary.agent=strict:Agent", "vehicles.primary.agent=vehicle_agent.survey:SurveyAgent"),
+    ],
+)
+def test_which_errors_numpy_raises_a_part_sets_for_itself_alone(
+    folder: Path, run: Run, strict: str, plain: str
+) -> None:
+    (folder / "strict.py").write_text(STRICT)
+    before = np.geterr()
+    risk_of_levels.cache_clear()  # its least values are too small for a number
+    code, summary, error = run(strict)
+    assert (code, error, np.geterr()) == (0, "", before)
+    assert summary["digest"] == run(plain)[1]["digest"]
+
+
+def test_a_mission_is_the_same_whatever_its_caller_has_numpy_raise(run: Run) -> None:
+    risk_of_levels.cache_clear()
+    with np.errstate(all="raise"):
+        code, summary, error = run()
+        assert np.geterr()["under"] == "raise"
+    assert (code, error) == (0, "")
+    assert summary["digest"] == run()[1]["digest"]

@@ -137,6 +137,17 @@ def test_a_fleet_that_cannot_be_drawn_is_found_and_does_not_end_the_campaign(mon
     assert str(found).startswith("a fleet is drawn: area.polygon_m: cuts the share of primary-2 in two")
 
 
+def test_an_error_that_nobody_has_foreseen_is_found_and_does_not_end_the_campaign(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def stumble(plan: TroublePlan) -> Outcome:
+        raise ZeroDivisionError("by nothing")
+
+    monkeypatch.setattr(campaign, "fly_storm", stumble)
+    (found,) = campaign.fly_number(None, 0, QUICK).violations
+    assert str(found).startswith("ends: ZeroDivisionError: by nothing (test_storm.py, line ")
+
+
 def test_a_storm_is_the_same_over_zenoh() -> None:
     plan = storm_of(None, QUICK)
     outcome = fly_storm(plan)

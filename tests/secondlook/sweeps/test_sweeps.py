@@ -19,11 +19,14 @@ from flights import BRIEF
 import secondlook
 from bench.sweep_kills import kill_and_resume
 from secondlook import cli
+from secondlook.compare import flights as compared
 from secondlook.engine import engine as engine_module
 from secondlook.engine.engine import Engine, own_processes
 from secondlook.errors import UserError
 from secondlook.files import CannotWriteError
+from secondlook.launch.processes import RunFailedError
 from secondlook.sweeps import folder as folder_module
+from secondlook.sweeps import rows as rows_module
 from secondlook.sweeps.fly import fly_missing
 from secondlook.sweeps.folder import read_rows, sweep_folder
 from secondlook.sweeps.plan import SweepPlan, load_sweep_plan
@@ -86,6 +89,26 @@ class TestRows:
             6: "it was not done after 0.5 s",
         }
         assert rows[6]["risk.mean"] is None
+
+    @pytest.mark.parametrize(
+        ("error", "told"),
+        [
+            (ZeroDivisionError("by nothing"), "the mission broke off: ZeroDivisionError: by nothing"),
+            (OSError("too many files"), "too many files"),
+            (RunFailedError("the sea was rough"), "the sea was rough"),
+        ],
+    )
+    def test_an_error_that_nobody_has_foreseen_fails_its_mission_alone(
+        self, monkeypatch: pytest.MonkeyPatch, error: Exception, told: str
+    ) -> None:
+        def stumble(*_: object, **__: object) -> None:
+            raise error
+
+        monkeypatch.setattr("secondlook.launch.mission.summarise", stumble)
+        (mission,) = plan(range(1, 2), vary={}).missions()
+        row, result = rows_module.fly(mission), compared.fly(mission.scenario)
+        assert isinstance(result, compared.Failure)
+        assert (row, row["failure"].partition(" (test_sweeps.py, ")[0]) == ({"failure": result.failure}, told)
 
     def test_every_figure_of_a_summary_that_is_no_list_has_a_column(self, tmp_path: Path) -> None:
         asked = plan(range(3, 4), vary={})
