@@ -75,7 +75,8 @@ class PlugInKind:
                 must = f"{self.what} must have {method}({', '.join(arguments)})"
                 if not callable(getattr(found, method, None)):
                     raise PlugInError(f"{must}; {text} has no {method}")
-                self._check_call(getattr(found, method), ("self", *arguments), must, by_place=True)
+                bound = ("self", *arguments) if _takes_self(found, method) else arguments
+                self._check_call(getattr(found, method), bound, must, by_place=True)
         maker: Callable[..., Any] = found
         return maker
 
@@ -104,6 +105,12 @@ class PlugInKind:
                 signature.bind(**dict.fromkeys(arguments))
         except TypeError as error:
             raise PlugInError(f"{must}; {error}") from error
+
+
+def _takes_self(kind: type, method: str) -> bool:
+    """Whether what a class has under this name is given the object when that is asked for it."""
+    found = inspect.getattr_static(kind, method, None)
+    return hasattr(type(found), "__get__") and not isinstance(found, (staticmethod, classmethod))
 
 
 def _import(module: str, name: str) -> Any:

@@ -31,6 +31,27 @@ class Idle:
     def assign(self, situation):
         return {}
 
+class Static:
+    @staticmethod
+    def assign(situation):
+        return LastFirst().assign(situation)
+
+class OfTheClass(LastFirst):
+    @classmethod
+    def assign(cls, situation):
+        return LastFirst().assign(situation)
+
+class Called:
+    class Answer:
+        def __call__(self, situation):
+            return LastFirst().assign(situation)
+    assign = Answer()
+
+class Overloaded:
+    @staticmethod
+    def assign(situation, more):
+        return {}
+
 class Clueless:
     def assign(self, situation):
         raise RuntimeError("no idea")
@@ -207,6 +228,17 @@ def test_a_part_changes_what_happens(run: Run) -> None:
         code, changed, _ = run(setting)
         assert code == 0
         assert changed["digest"] != plain["digest"], setting
+
+
+def test_a_method_may_be_one_of_the_class_or_static(run: Run) -> None:
+    _, plain, _ = run("coordinator.allocator=own:LastFirst")
+    for name in ("Static", "OfTheClass", "Called"):
+        code, summary, error = run(f"coordinator.allocator=own:{name}")
+        assert (code, error) == (0, "")
+        assert summary["digest"] == plain["digest"]
+    code, _, error = run("coordinator.allocator=own:Overloaded")
+    assert code == 2
+    assert "an allocator must have assign(situation); missing a required argument: 'more'" in error
 
 
 def test_a_curve_of_ones_own_is_written_out_in_the_scenario(folder: Path, run: Run) -> None:
