@@ -4,10 +4,12 @@ offers may be made now."""
 from __future__ import annotations
 
 import math
+import operator
+import reprlib
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from types import MappingProxyType
-from typing import Protocol
+from typing import Any, Protocol
 
 from coordinator.allocate.auction import AuctionAllocator
 from coordinator.allocate.cbba import CbbaAllocator
@@ -45,18 +47,33 @@ class Gate(Protocol):
 
 
 def checked_offers(offers: Mapping[str, int], situation: Situation) -> list[tuple[str, int]]:
-    """An allocator's offers, sorted; raises ValueError for any that is not of an open strip to a helper that is there,
-    or for a strip that is offered twice."""
+    """An allocator's offers, sorted, with whole numbers as Python's own; raises ValueError for any that is not of an
+    open strip to a helper that is there, or for a strip that is offered twice."""
     if not isinstance(offers, Mapping):
         raise ValueError(f"the allocator must answer with a mapping from vehicle to strip number, not {offers!r}")
     helpers = {helper.vehicle for helper in situation.helpers}
     left = {one.strip.number for one in situation.strips}
-    for vehicle, number in offers.items():
+    checked = dict[str, int]()
+    for vehicle, given in offers.items():
+        number = strip_number("the allocator", vehicle, given)
         if vehicle not in helpers or number not in left:
-            gives = f"the allocator gives strip {number!r} to {vehicle!r}"
+            gives = f"the allocator gives strip {number} to {vehicle!r}"
             raise ValueError(f"{gives}; must give an open strip, and each once, to a helper that is there")
         left.remove(number)
-    return sorted(offers.items())
+        checked[vehicle] = number
+    return sorted(checked.items())
+
+
+def strip_number(who: str, vehicle: object, given: Any) -> int:
+    """The number of the strip that an allocator, `who` it is, gives to a vehicle: an int, or one of numpy's. Raises
+    ValueError for anything else, such as 1.0 or True."""
+    try:
+        number = None if isinstance(given, bool) else operator.index(given)
+    except TypeError:
+        number = None
+    if number is None:
+        raise ValueError(f"{who} gives strip {reprlib.repr(given)} to {vehicle!r}; a strip's number must be an int")
+    return number
 
 
 def offers_let_through(allocator: Allocator, situation: Situation, gate: Gate) -> tuple[list[tuple[str, int]], float]:

@@ -117,6 +117,7 @@ class Allocator(Protocol):
 
     def assign(self, situation: Situation) -> Mapping[str, int]:
         """The number of an open strip for each helper that is to be sent to one; each strip at most once.
+        An int, or one of numpy's.
 
         A helper that has a task is told to give it back, which is no loss: it is offered a strip once it is free.
         """

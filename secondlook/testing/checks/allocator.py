@@ -10,12 +10,13 @@ from typing import Any
 
 from hypothesis import strategies as st
 
+from coordinator.allocate.allocators import strip_number
 from coordinator.allocate.service import expected_service
 from coordinator.allocate.situation import Helper, OpenStrip, Situation
 from planner.dubins import Pose
 from planner.types import Strip
 from secondlook.scenario.plug_ins import ALLOCATOR
-from secondlook.testing.checks.examples import EXAMPLES, PATIENCE_S, Checked, is_whole
+from secondlook.testing.checks.examples import EXAMPLES, PATIENCE_S, Checked
 
 _HELPERS = ("alpha", "beta", "gamma")
 
@@ -62,14 +63,18 @@ def _check_answer(name: str, answer: dict[Any, Any], situation: Situation, gone:
     there = {helper.vehicle: helper for helper in situation.helpers}
     open_numbers = [one.strip.number for one in situation.strips]
     given: dict[int, str] = {}
-    for vehicle, number in answer.items():
+    for vehicle, told in answer.items():
+        try:
+            number = strip_number(name, vehicle, told)
+        except ValueError as error:
+            raise AssertionError(str(error)) from None
         if vehicle not in there:
             lost = "is lost: it was there before, and is not now" if vehicle in gone else "is no helper"
             raise AssertionError(
                 f"{name} gives strip {number} to {vehicle!r}, which {lost}; there are {', '.join(there)}"
             )
-        if not is_whole(number) or number not in open_numbers:
-            raise AssertionError(f"{name} gives {vehicle} strip {number!r}, which is not open; open are {open_numbers}")
+        if number not in open_numbers:
+            raise AssertionError(f"{name} gives {vehicle} strip {number}, which is not open; open are {open_numbers}")
         if number in given:
             raise AssertionError(f"{name} gives strip {number} to two helpers, {given[number]} and {vehicle}")
         if number in there[vehicle].refused:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -191,11 +192,18 @@ def test_whatever_greedy_does_not_offer_clashes_with_an_offer_at_least_as_good(t
         ({"primary": 1}, "gives strip 1 to 'primary'; must give an open strip"),
         ({"alpha": 3}, "gives strip 3 to 'alpha'; must give an open strip"),
         ({"alpha": 1, "beta": 1}, "gives strip 1 to 'beta'; must give an open strip, and each once"),
+        ({"alpha": 1.0}, r"gives strip 1\.0 to 'alpha'; a strip's number must be an int$"),
+        ({"alpha": True}, "gives strip True to 'alpha'; a strip's number must be an int$"),
+        ({"alpha": np.True_}, r"gives strip np\.True_ to 'alpha'; a strip's number must be an int$"),
+        ({"alpha": "1"}, "gives strip '1' to 'alpha'; a strip's number must be an int$"),
+        ({"alpha": None}, "gives strip None to 'alpha'; a strip's number must be an int$"),
         (["alpha"], r"must answer with a mapping from vehicle to strip number, not \['alpha'\]"),
     ],
 )
 def test_an_answer_that_gives_what_is_not_there_or_one_strip_twice_is_refused(answer: object, wrong: str) -> None:
     told = situation([open_strip(strip(1)), open_strip(strip(2, 60))], [HELPER, replace(HELPER, vehicle="beta")])
     assert checked_offers({"beta": 1, "alpha": 2}, told) == [("alpha", 2), ("beta", 1)]
+    ((_, number),) = checked_offers({"alpha": np.int64(1)}, told)  # type: ignore[dict-item]
+    assert (type(number), number) == (int, 1)
     with pytest.raises(ValueError, match=wrong):
         checked_offers(answer, told)  # type: ignore[arg-type]

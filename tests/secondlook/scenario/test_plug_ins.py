@@ -339,7 +339,7 @@ def test_a_sonar_model_that_answers_wrongly_is_named(run: Run, model: str, sente
         ),
         (
             "Vague",
-            "ValueError: the allocator gives strip nan to 'helper'; must give an open strip, and each once, to a he",
+            "ValueError: the allocator gives strip nan to 'helper'; a strip's number must be an int",
         ),
         ("Speechless", "ValueError: the allocator must answer with a mapping from vehicle to strip number, not None"),
     ],

@@ -50,6 +50,9 @@ class TestOurs:
     def test_allocators(self, name: str) -> None:
         check_allocator(name)
 
+    def test_an_allocator_that_answers_with_numbers_of_numpys(self) -> None:
+        check_allocator(ByNumpy)
+
     @pytest.mark.parametrize("name", SPACING.ours)
     def test_spacing_planners(self, name: str) -> None:
         # Told P(y) in full they are asked after each track of each example, and think for longer.
@@ -158,6 +161,20 @@ class Pairs:
         return [(situation.helpers[0].vehicle, situation.strips[0].strip.number)]
 
 
+class Rough:
+    """Gives strips by numbers that are equal to theirs."""
+
+    def assign(self, situation: Any) -> Any:
+        return {helper: float(number) for helper, number in GreedyAllocator().assign(situation).items()}
+
+
+class ByNumpy:
+    """Gives strips by whole numbers of numpy's."""
+
+    def assign(self, situation: Any) -> Any:
+        return {helper: np.int64(number) for helper, number in GreedyAllocator().assign(situation).items()}
+
+
 class Forever:
     """Never answers, whatever it is."""
 
@@ -205,7 +222,8 @@ def no_allocator() -> int:
             r"Faithful gives strip \d to '\w+', which is lost: it was there before, and is not now; there",
         ),
         (Stranger, r"Stranger gives strip \d to 'nobody', which is no helper; there are \w+"),
-        (Inventive, r"Inventive gives \w+ strip nan, which is not open; open are \[\d\]"),
+        (Inventive, r"Inventive gives strip nan to '\w+'; a strip's number must be an int"),
+        (Rough, r"Rough gives strip \d\.0 to '\w+'; a strip's number must be an int"),
         (Pushy, r"Pushy gives strip \d to \w+, which has refused it"),
         (Dice, r"Dice answers \{.*\}, and \{.*\} when it (is asked again|was asked nothing else before)"),
         (Tired, r"Tired answers \{.*\}, and \{.*\} when it (is asked again|was asked nothing else before)"),
