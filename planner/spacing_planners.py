@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 import reprlib
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -62,8 +63,9 @@ class SinglesPlanner(SpacingPlanner, Protocol):
 
 def checked_decision(spacing: SpacingPlanner, method: str, answer: Any) -> SpacingDecision:
     """What a spacing planner, which may be a user's own, has answered to a method of its, if it can be planned with:
-    a range in whole metres from 1 on, finite offsets, and to be asked again after 1 track or more. Raises ValueError,
-    which names the planner, for anything else."""
+    a range in whole metres from 1 on, finite offsets, and to be asked again after 1 track or more. Its offsets are
+    taken out once, whatever holds them: a generator has none the second time. Raises ValueError, which names the
+    planner, for anything else."""
     kind = type(spacing)
     told = f"the spacing planner {kind.__module__}:{kind.__qualname__}"
     if not all(hasattr(answer, one.name) for one in fields(SpacingDecision)):
@@ -71,17 +73,37 @@ def checked_decision(spacing: SpacingPlanner, method: str, answer: Any) -> Spaci
         raise ValueError(f"{told} {must}, not {reprlib.repr(answer)}")
     for name, must in (("range_m", "whole metres"), ("asks_after", "a whole number of tracks")):
         value = getattr(answer, name)
-        if not hasattr(value, "__index__") or value < 1:
+        if not _is_whole(value) or value < 1:
             given = f"answers {method} with {name} {reprlib.repr(value)}"
             raise ValueError(f"{told} {given}; must be {must}, 1 or more")
+    given = f"answers {method} with offsets_m {reprlib.repr(answer.offsets_m)}"
     try:
-        wrong = [one for one in answer.offsets_m if not math.isfinite(one)]
+        each = iter(answer.offsets_m)
     except TypeError:
-        given = f"answers {method} with offsets_m {reprlib.repr(answer.offsets_m)}"
+        raise ValueError(f"{told} {given}; must be a tuple of metres across the tracks") from None
+    offsets_m = tuple(each)  # what a generator of theirs raises is told as theirs
+    try:
+        wrong = [one for one in offsets_m if not math.isfinite(one)]
+    except TypeError:
         raise ValueError(f"{told} {given}; must be a tuple of metres across the tracks") from None
     if wrong:
         raise ValueError(f"{told} lays a track at {wrong[0]} m by {method}; must be a finite number of metres")
-    return answer  # type: ignore[no-any-return]
+    return SpacingDecision(
+        int(answer.range_m),
+        tuple(map(float, offsets_m)),
+        answer.replans,
+        answer.note,
+        answer.singles,
+        int(answer.asks_after),
+    )
+
+
+def _is_whole(value: Any) -> bool:
+    try:
+        operator.index(value)
+    except TypeError:
+        return False
+    return not isinstance(value, bool)
 
 
 def checked_if_any(spacing: SpacingPlanner, method: str, answer: Any) -> SpacingDecision | None:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -231,11 +233,27 @@ def test_the_lowest_range_is_three_nadir_gaps_in_whole_metres(nadir_gap_m: float
     assert lowest_range_m(nadir_gap_m) == lowest_m
 
 
+@pytest.mark.parametrize("holds", [list, iter, np.array, lambda offsets_m: (one for one in offsets_m)])
+def test_offsets_are_taken_out_once_whatever_holds_them(holds: Callable[[tuple[float, ...]], Any]) -> None:
+    decision = SpacingDecision(80, (20.0, 60.0), replans=False)
+    answer = replace(decision, offsets_m=holds(decision.offsets_m))
+    assert checked_decision(FixedSpacing(20.0, 80.0), "lay", answer) == decision
+
+
+def test_what_a_generator_of_offsets_raises_is_its_own() -> None:
+    answer: Any = SimpleNamespace(**vars(SpacingDecision(80, (), replans=False)))
+    answer.offsets_m = (one + "m" for one in (20.0, 60.0))  # type: ignore[operator]
+    with pytest.raises(TypeError, match="unsupported operand"):
+        checked_decision(FixedSpacing(20.0, 80.0), "lay", answer)
+
+
 @pytest.mark.parametrize(
     ("changed", "sentence"),
     [
         ({"asks_after": 0}, "answers lay with asks_after 0; must be a whole number of tracks, 1 or more"),
         ({"range_m": 0}, "answers lay with range_m 0; must be whole metres, 1 or more"),
+        ({"range_m": True}, "answers lay with range_m True; must be whole metres, 1 or more"),
+        ({"range_m": np.array([80, 90])}, "answers lay with range_m array([80, 90]); must be whole metres, 1 or more"),
         ({"range_m": None}, "answers lay with range_m None; must be whole metres, 1 or more"),
         ({"offsets_m": (40.0, math.inf)}, "lays a track at inf m by lay; must be a finite number of metres"),
         ({"offsets_m": ("40",)}, "answers lay with offsets_m ('40',); must be a tuple of metres across the tracks"),
@@ -246,10 +264,11 @@ def test_a_decision_that_cannot_be_planned_with_is_told_with_who_made_it(
 ) -> None:
     planner = FixedSpacing(20.0, 80.0)
     decision = SpacingDecision(80, (20.0, 60.0), replans=False)
-    assert checked_decision(planner, "lay", decision) is decision
+    assert checked_decision(planner, "lay", decision) == decision
     by_numpy: dict[str, Any] = {"range_m": np.int64(80), "offsets_m": tuple(np.array([20.0, 60.0]))}
     whole = replace(decision, **by_numpy)
-    assert checked_decision(planner, "lay", whole) is whole
+    assert checked_decision(planner, "lay", whole) == decision
+    assert type(checked_decision(planner, "lay", whole).range_m) is int
     told = re.escape(f"the spacing planner planner.spacing_planners:FixedSpacing {sentence}")
     with pytest.raises(ValueError, match=f"^{told}$"):
         checked_decision(planner, "lay", replace(decision, **changed))

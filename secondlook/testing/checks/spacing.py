@@ -88,26 +88,19 @@ def _survey_by_profile(checked: Checked, given: dict[str, float], width_m: float
     while len(flown) <= _MOST_TRACKS:
         part = PartSoFar(width_m, None, tuple(flown), planned_m, curve, known_m)
         told = f"{checked.name}, lay, after {len(flown)} tracks over {width_m:g} m,"
-        decision = checked.ask(veteran, "lay", part, terms)
-        if checked.ask(checked.make(**given), "lay", part, terms) != decision:
+        decision = _read_laid(checked.ask(veteran, "lay", part, terms), told)
+        if _read_laid(checked.ask(checked.make(**given), "lay", part, terms), told) != decision:
             raise AssertionError(f"{told} decides otherwise when it was asked nothing else before")
         if decision is None:
             return
-        range_m, offsets_m, replans, _ = _read(decision, told)
-        asks_after: Any = getattr(decision, "asks_after", None)
-        singles: Any = getattr(decision, "singles", None)
-        if not is_whole(asks_after) or asks_after < 1 or not isinstance(singles, bool):
-            raise AssertionError(
-                f"{told} must say after how many tracks to ask again, at least 1, and whether they are single ones,"
-                f" not {asks_after!r} and {singles!r}"
-            )
+        (range_m, offsets_m, replans, _), asks_after, singles = decision
         if not replans:
             return
-        for across_m in offsets_m[: int(asks_after)]:
+        for across_m in offsets_m[:asks_after]:
             known_m = r_eff_m[min(len(flown), len(r_eff_m) - 1)]
             curve = _curve(given, known_m)
             flown.append(FlownTrack(across_m, max(known_m, range_m) if singles else known_m, singles, curve))
-        planned_m = offsets_m[int(asks_after) :]
+        planned_m = offsets_m[asks_after:]
     raise AssertionError(f"{checked.name}, lay: the survey never ends: {width_m:g} m, and {_MOST_TRACKS} tracks flown")
 
 
@@ -119,13 +112,29 @@ def _curve(given: dict[str, float], r_eff_m: int) -> DetectionCurve:
     return DetectionCurve(np.array([near_m, float(r_eff_m)]), np.array([0.6, 0.1]))
 
 
-def _decision(
-    checked: Checked, plug_in: Any, question: tuple[float, float, int | None]
-) -> tuple[int, tuple[float, ...], bool, str]:
+_Decision = tuple[int, tuple[float, ...], bool, str]
+
+
+def _decision(checked: Checked, plug_in: Any, question: tuple[float, float, int | None]) -> _Decision:
     return _read(checked.ask(plug_in, "decide", *question), f"{checked.name}, asked for {question},")
 
 
-def _read(decision: Any, told: str) -> tuple[int, tuple[float, ...], bool, str]:
+def _read_laid(decision: Any, told: str) -> tuple[_Decision, int, bool] | None:
+    """The same of what says in its answer when to ask again, and whether the tracks are single ones; or None."""
+    if decision is None:
+        return None
+    read = _read(decision, told)
+    asks_after: Any = getattr(decision, "asks_after", None)
+    singles: Any = getattr(decision, "singles", None)
+    if not is_whole(asks_after) or asks_after < 1 or not isinstance(singles, bool):
+        raise AssertionError(
+            f"{told} must say after how many tracks to ask again, at least 1, and whether they are single ones,"
+            f" not {asks_after!r} and {singles!r}"
+        )
+    return read, int(asks_after), singles
+
+
+def _read(decision: Any, told: str) -> _Decision:
     """Range, offsets, whether to ask again, and note, if they can be planned with."""
     try:
         range_m, offsets_m = decision.range_m, tuple(decision.offsets_m)

@@ -74,6 +74,10 @@ class Every60:
     def decide(self, width_m, covered_m, r_eff_m):
         return SpacingDecision(60, tuple(np.arange(30.0, width_m, 60.0).tolist()), replans=False)
 
+class OneByOne(Every60):
+    def decide(self, width_m, covered_m, r_eff_m):
+        return SpacingDecision(60, (across_m for across_m in np.arange(30.0, width_m, 60.0)), replans=False)
+
 class Nowhere(Every60):
     def decide(self, width_m, covered_m, r_eff_m):
         return SpacingDecision(60, (float("nan"),), replans=False)
@@ -239,6 +243,12 @@ def test_a_method_may_be_one_of_the_class_or_static(run: Run) -> None:
     code, _, error = run("coordinator.allocator=own:Overloaded")
     assert code == 2
     assert "an allocator must have assign(situation); missing a required argument: 'more'" in error
+
+
+def test_tracks_may_be_told_one_by_one(run: Run) -> None:
+    _, plain, _ = run("vehicles.primary.spacing=own:Every60")
+    code, summary, error = run("vehicles.primary.spacing=own:OneByOne")
+    assert (code, error, summary["digest"]) == (0, "", plain["digest"])
 
 
 def test_a_curve_of_ones_own_is_written_out_in_the_scenario(folder: Path, run: Run) -> None:

@@ -381,6 +381,18 @@ class Moody(ProfileSpacing):
         return SpacingDecision(60, (float(self.asked),), replans=False)
 
 
+class OneByOne(ProfileSpacing):
+    """Ours, with its tracks in a generator."""
+
+    def lay(self, part: Any, terms: Any) -> Any:
+        decision = super().lay(part, terms)
+        return decision and replace(decision, offsets_m=iter(decision.offsets_m))  # type: ignore[arg-type]
+
+
+def test_a_planner_by_the_whole_curve_may_hand_over_a_generator() -> None:
+    check_spacing_planner(OneByOne, examples=2)
+
+
 @pytest.mark.parametrize(
     ("planner", "sentence"),
     [
