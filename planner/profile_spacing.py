@@ -20,6 +20,7 @@ from planner.spacing_planners import (
     checked_decision,
     checked_if_any,
     counted_range_m,
+    told_of,
 )
 from planner.types import DetectionCurve
 
@@ -154,7 +155,7 @@ def first_decision(
     spacing: SpacingPlanner, width_m: float, known: Known | None, terms: SpacingTerms
 ) -> SpacingDecision:
     """The tracks for a whole part, by all that the spacing planner can make use of. Raises ValueError for an answer of
-    a user's own that is no decision (`checked_decision`)."""
+    a user's own that is no decision (`checked_decision`), or lays no track by `decide`."""
     measured_m = known.r_eff_m if known is not None and known.measured else None
     decision = None
     if known is not None and isinstance(spacing, ProfilePlanner):
@@ -164,6 +165,8 @@ def first_decision(
         decision = checked_if_any(spacing, "cover", spacing.cover(width_m, (), measured_m))
     if decision is None:
         decision = checked_decision(spacing, "decide", spacing.decide(width_m, 0.0, measured_m))
+        if not decision.offsets_m:
+            raise ValueError(f"{told_of(spacing)} lays no track by decide; must lay one or more over {width_m:g} m")
     return decision
 
 

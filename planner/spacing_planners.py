@@ -66,8 +66,7 @@ def checked_decision(spacing: SpacingPlanner, method: str, answer: Any) -> Spaci
     a range in whole metres from 1 on, finite offsets, and to be asked again after 1 track or more. Its offsets are
     taken out once, whatever holds them: a generator has none the second time. Raises ValueError, which names the
     planner, for anything else."""
-    kind = type(spacing)
-    told = f"the spacing planner {kind.__module__}:{kind.__qualname__}"
+    told = told_of(spacing)
     if not all(hasattr(answer, one.name) for one in fields(SpacingDecision)):
         must = f"must answer {method} with a planner.spacing_planners.SpacingDecision"
         raise ValueError(f"{told} {must}, not {reprlib.repr(answer)}")
@@ -96,6 +95,12 @@ def checked_decision(spacing: SpacingPlanner, method: str, answer: Any) -> Spaci
         answer.singles,
         int(answer.asks_after),
     )
+
+
+def told_of(spacing: SpacingPlanner) -> str:
+    """Who a spacing planner is, for a sentence."""
+    kind = type(spacing)
+    return f"the spacing planner {kind.__module__}:{kind.__qualname__}"
 
 
 def _is_whole(value: Any) -> bool:

@@ -78,6 +78,10 @@ class OneByOne(Every60):
     def decide(self, width_m, covered_m, r_eff_m):
         return SpacingDecision(60, (across_m for across_m in np.arange(30.0, width_m, 60.0)), replans=False)
 
+class NoTrack(Every60):
+    def decide(self, width_m, covered_m, r_eff_m):
+        return SpacingDecision(60, (), replans=False)
+
 class Nowhere(Every60):
     def decide(self, width_m, covered_m, r_eff_m):
         return SpacingDecision(60, (float("nan"),), replans=False)
@@ -371,6 +375,7 @@ DECISION = "with a planner.spacing_planners.SpacingDecision, not "
         ("Nowhere", "0.001 s", "lays a track at nan m by decide; must be a finite number of metres"),
         ("Halved", "0.001 s", "answers decide with range_m 60.5; must be whole metres, 1 or more"),
         ("OneTrack", "0.001 s", "answers decide with offsets_m 30.0; must be a tuple of metres across the tracks"),
+        ("NoTrack", "0.001 s", "lays no track by decide; must lay one or more over 300 m"),
         ("HushedLater", "", f"must answer decide {DECISION}None"),
         ("PairedSingles", "", f"must answer cover {DECISION}(60, (90.0,))"),
     ],
