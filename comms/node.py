@@ -5,8 +5,11 @@ A node never reads a clock, a socket or a global random generator; `random_strea
 
 from __future__ import annotations
 
+import operator
+import reprlib
 import zlib
-from typing import TYPE_CHECKING, Generic, NamedTuple, Protocol
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol
 
 import numpy as np
 
@@ -69,6 +72,47 @@ class Step(NamedTuple):
     publish: tuple[Publication, ...] = ()
     wake_ms: int | None = None
     dropped: tuple[str, ...] = ()
+
+
+def checked_step(node: object, method: str, answer: Any) -> Step:
+    """What a node, which may be a user's own, has answered to a method of its, what it holds as tuples. Raises
+    ValueError, which names the node's class, for what is no `Step`, or one of other things than a step has."""
+    if not isinstance(answer, Step):
+        raise ValueError(f"{_told_of(node)} must answer {method} with a comms.node.Step, not {reprlib.repr(answer)}")
+    publish, wake_ms, dropped = _as_tuple(answer.publish), answer.wake_ms, _as_tuple(answer.dropped)
+    wrong = None
+    if not all(isinstance(one, Publication) and isinstance(one.key, str) for one in publish):
+        wrong = "publish", "a tuple of comms.node.Publication, each with a key"
+    elif not (wake_ms is None or _is_whole(wake_ms)):
+        wrong = "wake_ms", "whole milliseconds, or None"
+    elif not all(isinstance(one, str) for one in dropped):
+        wrong = "dropped", "a tuple of texts"
+    if wrong is not None:
+        name, must = wrong
+        given = reprlib.repr(getattr(answer, name))
+        raise ValueError(f"{_told_of(node)} answers {method} with a Step whose {name} is {given}; must be {must}")
+    return Step(publish, None if wake_ms is None else int(wake_ms), dropped)
+
+
+def _told_of(node: object) -> str:
+    kind = type(node)
+    return f"the node {kind.__module__}:{kind.__qualname__}"
+
+
+def _is_whole(given: Any) -> bool:
+    if type(given) is not int:  # as nearly all are
+        try:
+            operator.index(given)
+        except TypeError:
+            return False
+    return not isinstance(given, bool)
+
+
+def _as_tuple(given: Any) -> tuple[Any, ...]:
+    """What it holds; of a text, or what holds nothing, something that nobody may say."""
+    if type(given) is tuple:
+        return given
+    return tuple(given) if isinstance(given, Iterable) and not isinstance(given, str) else (None,)
 
 
 class Node(Protocol):

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from comms.errors import NO_FAILURES, NodeError, in_words, one_line
-from comms.node import Listener, Node, Publication, Received, Step
+from comms.node import Listener, Node, Publication, Received, Step, checked_step
 from comms.said.announcement import RunInfo
 from comms.said.codec import CLOCK, Header, body_of, decode, message_of, packed
 from comms.said.messages import Heard, Message
@@ -180,13 +180,13 @@ class GuardedNode:
         try:
             with np.errstate():
                 if start:
-                    self._note(self._node.start(now_ms), published)
+                    self._note("start", self._node.start(now_ms), published)
                 for one in mail:
                     received = self._opened(one)
                     if received is not None:
-                        self._note(self._node.on_message(received, now_ms), published)
+                        self._note("on_message", self._node.on_message(received, now_ms), published)
                 if wake and self.is_due(now_ms):
-                    self._note(self._node.on_wake(now_ms), published)
+                    self._note("on_wake", self._node.on_wake(now_ms), published)
         except (NodeError, *NO_FAILURES):
             raise
         except BaseException as error:
@@ -202,7 +202,8 @@ class GuardedNode:
         message = received.message
         return self._letters.open(message.key, message.payload) if isinstance(message, Heard) else received
 
-    def _note(self, step: Step, published: list[Publication]) -> None:
+    def _note(self, method: str, answer: Step, published: list[Publication]) -> None:
+        step = checked_step(self._node, method, answer)
         self.wake_ms = step.wake_ms
         if step.dropped:
             self._dropped.update(step.dropped)

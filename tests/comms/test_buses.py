@@ -2,15 +2,32 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
-from fleets import BUSES, Bus, Notes, Scripted, fleet_that_talks, nav, say_nav, say_over, say_state, say_status, says
+from fleets import (
+    BUSES,
+    ROSTER,
+    Bus,
+    Notes,
+    Scripted,
+    fleet_that_talks,
+    nav,
+    say_nav,
+    say_over,
+    say_state,
+    say_status,
+    says,
+)
 
 from comms.errors import NodeError, RunawayError
 from comms.lockstep import clock
-from comms.node import Step
+from comms.node import Publication, Received, Step
 from comms.result import Ending
+from comms.runner import GuardedNode
 from comms.said.announcement import RunInfo
+from comms.said.routing import Routing
 from comms.said.topics import TRUTH_TARGETS
 
 
@@ -171,6 +188,59 @@ def test_the_local_bus_refuses_what_a_node_may_not_write(publication: object, se
     alpha = Scripted(starts=lambda now_ms: Step((publication,)))  # type: ignore[arg-type]
     with pytest.raises(NodeError, match=sentence):
         BUSES["local"]({"alpha": alpha}, Notes())
+
+
+step: Any = Step
+publication: Any = Publication
+ODD: list[tuple[Any, str]] = [
+    ([], r"must answer start with a comms\.node\.Step, not \[\]"),
+    (((), None), r"must answer start with a comms\.node\.Step, not \(\(\), None\)"),
+    (step(publish=None), "answers start with a Step whose publish is None; must be a tuple of comms.node.Publication"),
+    (
+        step(publish=say_nav("alpha")),
+        r"Step whose publish is Publication\(.*; must be a tuple of comms.node.Publication",
+    ),
+    (step(publish=("word",)), r"Step whose publish is \('word',\); must be a tuple of comms.node.Publication"),
+    (step(publish=(publication([], nav(3.0)),)), r"Step whose publish is \(Publication\(.*, each with a key"),
+    (step(wake_ms=2.5), r"Step whose wake_ms is 2\.5; must be whole milliseconds, or None"),
+    (step(wake_ms="soon"), "Step whose wake_ms is 'soon'; must be whole milliseconds, or None"),
+    (step(wake_ms=True), "Step whose wake_ms is True; must be whole milliseconds, or None"),
+    (step(dropped="late"), "Step whose dropped is 'late'; must be a tuple of texts"),
+    (step(dropped=(7,)), r"Step whose dropped is \(7,\); must be a tuple of texts"),
+]
+
+
+class Odd:
+    """A node that answers at its start with what is no step."""
+
+    def __init__(self, answer: Any) -> None:
+        self._answer = answer
+
+    def start(self, now_ms: int) -> Any:
+        return self._answer
+
+    def on_message(self, received: Received, now_ms: int) -> Step:
+        return Step()
+
+    def on_wake(self, now_ms: int) -> Step:
+        return Step()
+
+
+@pytest.mark.parametrize(("answer", "sentence"), ODD)
+def test_an_answer_that_is_no_step_is_told_with_the_class_of_the_node(answer: Any, sentence: str) -> None:
+    node = GuardedNode("alpha", Odd(answer), Routing(ROSTER))
+    told = rf"^alpha has failed at 0\.000 s: ValueError: the node \S*test_buses:Odd .*{sentence}"
+    with pytest.raises(NodeError, match=told):
+        node.act(0, start=True)
+
+
+def test_what_a_step_holds_may_be_given_one_by_one_and_by_numpy() -> None:
+    node = GuardedNode(
+        "alpha", Odd(step(iter([say_state("alpha")]), np.int64(7), iter(["late", "late"]))), Routing(ROSTER)
+    )
+    (said,) = node.act(0, start=True)
+    assert (said.key, node.wake_ms, type(node.wake_ms)) == ("agent/alpha/state", 7, int)
+    assert node.dropped == {"late": 2}
 
 
 def test_agents_have_no_route_to_the_truth() -> None:

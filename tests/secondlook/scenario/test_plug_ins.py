@@ -140,6 +140,18 @@ class Broken(CurveSonar):
     def p_detect(self, *asked):
         return asked[7]
 
+class Listing(SurveyAgent):
+    def start(self, now_ms):
+        return []
+
+class Mute(SurveyAgent):
+    def on_message(self, received, now_ms):
+        return None
+
+class Dazed(SurveyAgent):
+    def on_wake(self, now_ms):
+        return None
+
 class HalfCharged(SurveyAgent):
     def battery(self, now_ms):
         return 0.5
@@ -385,6 +397,22 @@ def test_a_spacing_planner_that_answers_wrongly_is_named(run: Run, spacing: str,
     assert code == 1
     told = re.escape(f"ValueError: the spacing planner own:{spacing} {sentence}; what was recorded is in ")
     assert re.search(rf"^primary has failed at {re.escape(at) or '[0-9.]+ s'}: {told}", error, re.MULTILINE), error
+
+
+@pytest.mark.parametrize(
+    ("agent", "told", "bus"),
+    [
+        ("Listing", "must answer start with a comms.node.Step, not []", "local"),
+        ("Listing", "must answer start with a comms.node.Step, not []", "zenoh"),
+        ("Mute", "must answer on_message with a comms.node.Step, not None", "local"),
+        ("Dazed", "must answer on_wake with a comms.node.Step, not None", "local"),
+    ],
+)
+def test_a_node_that_answers_wrongly_is_named(run: Run, agent: str, told: str, bus: str) -> None:
+    code, _, error = run(f"vehicles.primary.agent=own:{agent}", bus=bus)
+    assert code == 1
+    sentence = re.escape(f"ValueError: the node own:{agent} {told}; what was recorded is in ")
+    assert re.search(rf"^primary has failed at [0-9.]+ s: {sentence}", error, re.MULTILINE), error
 
 
 def test_what_it_answers_wrongly_is_told_before_anything_flies_too(folder: Path, called: Call) -> None:
