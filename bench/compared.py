@@ -1,19 +1,13 @@
 """The table of docs/comparing.md, from what `secondlook compare` has written.
 
-python -m bench.compared FOLDER [FOLDER ...]
-
-Each FOLDER is the `--out` of a comparison. For each contender it prints, as Markdown, the mean residual risk and that
-of the worst 30 % when its missions ended, how far both lie above the first contender's with the 95 % interval, and on
-how many seeds the first one leaves less, and more, by the objective.
+For each contender it holds the mean residual risk and that of the worst 30 % when its missions ended, how far both lie
+above the first contender's with the 95 % interval, and on how many seeds the first one leaves less, and more, by the
+objective.
 """
 
 from __future__ import annotations
 
-import argparse
-import json
-import sys
 from collections.abc import Iterable, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 HEAD = (
@@ -47,28 +41,3 @@ def _difference(pair: Mapping[str, Any] | None) -> str:
 
 def _line(cells: Iterable[str]) -> str:
     return "| " + " | ".join(cells) + " |"
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Prints the table of the folders that the command line names."""
-    parser = argparse.ArgumentParser(prog="python -m bench.compared", description=__doc__)
-    parser.add_argument("folders", metavar="FOLDER", nargs="+", type=Path)
-    folders = parser.parse_args(arguments).folders
-    missing = [folder for folder in folders if not (folder / "compare.json").is_file()]
-    if missing:
-        print(
-            f"{missing[0]}: there is no compare.json in it; must be the --out of `secondlook compare`", file=sys.stderr
-        )
-        return 2
-    comparisons = [json.loads((folder / "compare.json").read_text()) for folder in folders]
-    firsts = [told["contenders"][0]["name"] for told in comparisons]
-    for folder, first in zip(folders, firsts, strict=True):
-        if first != firsts[0]:
-            print(f"{folder}: its first contender is {first}; must be {firsts[0]}, as in {folders[0]}", file=sys.stderr)
-            return 2
-    print(table(comparisons))
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
