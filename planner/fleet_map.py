@@ -30,8 +30,8 @@ Place = tuple[int, int]
 
 @dataclass
 class VehicleLayer:
-    """What one vehicle has published, over all its starts: levels, settled cells and of which cells it has told, all of
-    grid shape; sums of its starts saturate as those of one do.
+    """What one vehicle has published, over all its starts: levels and settled cells, all of grid shape; sums of its
+    starts saturate as those of one do.
 
     `versions`: of each tile, by incarnation, the newest version that has come. Memory does not grow with each start:
     of a tile of which more than MOST_STARTS starts have told, the oldest are held as one, whose version is CLOSED.
@@ -41,7 +41,6 @@ class VehicleLayer:
     sum_levels: LevelArray
     largest_levels: LevelArray
     settled: BoolArray
-    told: BoolArray
     versions: dict[Place, dict[int, int]] = field(default_factory=dict)
     _apart: dict[Place, dict[int, _Told]] = field(default_factory=dict)  # where more than one start has told
 
@@ -52,7 +51,6 @@ class VehicleLayer:
             sum_levels=np.zeros(grid.shape, dtype=np.uint8),
             largest_levels=np.zeros(grid.shape, dtype=np.uint8),
             settled=np.zeros(grid.shape, dtype=np.bool_),
-            told=np.zeros(grid.shape, dtype=np.bool_),
         )
 
     def take(self, place: Place, window: Window, incarnation: int, tile: ToldTile) -> bool:
@@ -70,7 +68,6 @@ class VehicleLayer:
         self.sum_levels[window] = told.sum_levels
         self.largest_levels[window] = told.largest_levels
         self.settled[window] = told.settled
-        self.told[window] = True
         return True
 
     def _with_other_starts(self, place: Place, window: Window, incarnation: int, told: ToldTile) -> _Told:
@@ -205,20 +202,8 @@ class FleetMap:
                 settled |= self.layers[vehicle].settled[window]
         return settled
 
-    def told_by(self, vehicles: Iterable[str]) -> BoolArray:
-        """Cells in a tile of one of these vehicles."""
-        told = np.zeros(self.grid.shape, dtype=np.bool_)
-        for vehicle in vehicles:
-            if vehicle in self.layers:
-                told |= self.layers[vehicle].told
-        return told
-
-    def risk_of(self, vehicles: set[str]) -> tuple[FloatArray, BoolArray]:
-        """Residual risk, and which cells are seen, from these vehicles' layers alone."""
-        return self.risk_of_layers(layer for vehicle, layer in self.layers.items() if vehicle in vehicles)
-
     def risk_of_layers(self, layers: Iterable[VehicleLayer]) -> tuple[FloatArray, BoolArray]:
-        """The same from these layers, of this map or as they once were."""
+        """Residual risk, and which cells are seen, from these layers alone, of this map or as they once were."""
         risk, sums = self._joined(EVERYWHERE, list(layers))
         return risk, sums > 0
 

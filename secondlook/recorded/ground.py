@@ -4,7 +4,7 @@ contacts, and the targets."""
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -43,12 +43,11 @@ class RiskMap:
     inside: BoolArray
 
     @classmethod
-    def of(cls, t_s: float, metrics: Metrics, vehicles: Collection[str] | None = None) -> RiskMap:
-        """The map of all that was taken until `t_s`; `vehicles`: of these alone."""
+    def of(cls, t_s: float, metrics: Metrics) -> RiskMap:
+        """The map of all that was taken until `t_s`."""
         fleet = metrics.map
         assert fleet is not None  # announced before anything else
-        risk, seen = (fleet.risk, fleet.seen()) if vehicles is None else fleet.risk_of(set(vehicles))
-        return cls(t_s, fleet.grid, risk, seen, metrics.inside)
+        return cls(t_s, fleet.grid, fleet.risk, fleet.seen(), metrics.inside)
 
     @cached_property
     def x_m(self) -> FloatArray:

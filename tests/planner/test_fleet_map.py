@@ -133,7 +133,7 @@ def test_what_is_seen_is_what_has_a_risk_below_1(told: list[TileNews], rho: floa
         # A layer's largest look has a level where the sum has.
         replace(news, largest_levels=np.maximum(news.largest_levels, np.minimum(news.sum_levels, 1))).give(fleet)
     np.testing.assert_array_equal(fleet.seen(), fleet.risk < 1)
-    risk, seen = fleet.risk_of({"alpha", "beta", "gamma"})
+    risk, seen = fleet.risk_of_layers(fleet.layers.values())
     np.testing.assert_array_equal(risk, fleet.risk)
     np.testing.assert_array_equal(seen, fleet.seen())
 
@@ -237,7 +237,7 @@ def test_layers_can_be_told_apart() -> None:
     fleet = FleetMap(GRID)
     tile("alpha", (0, 1), PLACES[0], 50).give(fleet)
     tile("beta", (0, 1), PLACES[1], 30).give(fleet)
-    risk, seen = fleet.risk_of({"alpha"})
+    risk, seen = fleet.risk_of_layers([fleet.layers["alpha"]])
     assert (risk[0, 0], risk[0, 20]) == (pytest.approx(math.exp(-1.0)), 1.0)
     assert (seen[0, 0], seen[0, 20]) == (True, False)
     assert np.count_nonzero(fleet.seen()) == 400 + 60

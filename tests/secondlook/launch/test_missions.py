@@ -126,9 +126,9 @@ class TestEveryMission:
         risk, alone = mission.summary["risk"], mission.summary["risk_primary_alone"]
         for name in ("mean", "worst30_mean", "uncovered_share"):
             assert risk[name] <= alone[name]
-        everyone, primary = mission.metrics.map, {PRIMARY}
+        everyone = mission.metrics.map
         assert everyone is not None
-        assert (everyone.risk <= everyone.risk_of(primary)[0]).all()
+        assert (everyone.risk <= everyone.risk_of_layers([everyone.layers[PRIMARY]])[0]).all()
 
     def test_everyone_sees_one_map(self, mission: Flown) -> None:
         fleet, coordinators = mission.metrics.map, mission.nodes["coordinator"].fleet.map
