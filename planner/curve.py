@@ -97,11 +97,3 @@ def effective_range_m(curve: DetectionCurve, threshold: float) -> int | None:
     (near_m, far_m), (above, below) = curve.range_m[outer - 1 : outer + 1], curve.p_detect[outer - 1 : outer + 1]
     crossing_m = near_m + (far_m - near_m) * max(above - threshold, 0.0) / (above - below)
     return math.floor(float(crossing_m) + _TOLERANCE)
-
-
-def reach_m(curve: DetectionCurve) -> tuple[float, float] | None:
-    """The nearest and the farthest range among a curve's points with P(y) > 0, in metres; None where it is 0."""
-    seen = np.flatnonzero(curve.p_detect > 0)
-    if seen.size == 0:
-        return None
-    return float(curve.range_m[seen[0]]), float(curve.range_m[seen[-1]])

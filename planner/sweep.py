@@ -38,14 +38,12 @@ class Pass(NamedTuple):
 class Sweep:
     """A way to fly a strip's legs, which are numbered from 1 in the order of flying.
 
-    `length_m`: from the first leg's run-in to the last one's run-out, turns included. `follows`: it is one leg, the
-    strip's way.
+    `length_m`: from the first leg's run-in to the last one's run-out, turns included.
     """
 
     legs: tuple[Track, ...]
     passes: tuple[Pass, ...]
     length_m: float
-    follows: bool
 
     @property
     def entry(self) -> Pose:
@@ -107,9 +105,8 @@ def sweeps_over(
         for way in [legs, turned] if len(legs) == 1 else [legs, legs[::-1], turned, turned[::-1]]:
             passes = tuple(pass_over(leg.start, leg.end, run_in_m, lead_m) for leg in way)
             numbered = tuple(replace(leg, number=number) for number, leg in enumerate(way, start=1))
-            follows = len(legs) == 1 and way is legs
             if _stays_out(passes, turn_radius_m, keep_out):
-                found.append(Sweep(numbered, passes, length_over(passes, turn_radius_m, keep_out), follows))
+                found.append(Sweep(numbered, passes, length_over(passes, turn_radius_m, keep_out)))
     return tuple(found)
 
 

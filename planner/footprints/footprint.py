@@ -51,10 +51,6 @@ class Footprint(Protocol):
         """Within which lateral ranges a pass leaves no ground without a look."""
 
     @property
-    def widest_m(self) -> float:
-        """How far to a side it sees anything at all, at least `reach.far_m`."""
-
-    @property
     def ahead_m(self) -> float:
         """How far ahead of the vehicle it sees, >= 0."""
 

@@ -23,11 +23,6 @@ class SideLooking:
         return Reach(self.shape.near_m, self.shape.far_m)
 
     @property
-    def widest_m(self) -> float:
-        """The range."""
-        return self.shape.far_m
-
-    @property
     def outline(self) -> tuple[tuple[Point, ...], ...]:
         """A line to each side."""
         return tuple(((side * self.shape.near_m, 0.0), (side * self.shape.far_m, 0.0)) for side in (-1, 1))

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from planner.curve import RangeTally, effective_range_m, mean_curve, reach_m
+from planner.curve import RangeTally, effective_range_m, mean_curve
 from planner.types import DetectionCurve
 
 
@@ -143,14 +143,3 @@ class TestEffectiveRange:
     def test_refuses_a_threshold_that_is_none(self, threshold: float) -> None:
         with pytest.raises(ValueError, match="threshold"):
             effective_range_m(curve_of((0, 0.1), (1, 0.2)), threshold)
-
-
-class TestReach:
-    def test_is_the_first_and_last_point_with_detection(self) -> None:
-        assert reach_m(curve_of((0, 0), (25, 0.01), (30, 0), (70, 0.5), (130, 0.02), (131, 0))) == (25, 130)
-
-    def test_of_a_curve_without_gaps_is_its_extent(self) -> None:
-        assert reach_m(curve_of((0, 0.3), (60, 0.3))) == (0, 60)
-
-    def test_is_none_where_nothing_is_detected(self) -> None:
-        assert reach_m(curve_of((0, 0), (60, 0))) is None

@@ -130,12 +130,12 @@ class TestShortestSweep:
         assert near_enough_m == pytest.approx(160)
         assert too_near_m > 180
 
-    def test_one_leg_the_strips_way_follows(self) -> None:
+    def test_one_leg_is_flown_the_strips_way_or_back(self) -> None:
         one_leg = Strip(1, (10, 0), NORTH, 100, 20)
-        assert [sweep.follows for sweep in sweeps_over(one_leg, 20, 10, 0)] == [True, False]
-        assert cheapest(one_leg, Pose(10, -50, NORTH), 10, 0, 20)[0].follows
-        assert not cheapest(one_leg, Pose(10, 150, SOUTH), 10, 0, 20)[0].follows
-        assert not any(sweep.follows for sweep in sweeps_over(self.STRIP, 20, 10, 0))
+        there, back = sweeps_over(one_leg, 20, 10, 0)
+        assert (*there.legs[0].start, *back.legs[0].start) == pytest.approx((10, 0, 10, 100), abs=1e-9)
+        assert cheapest(one_leg, Pose(10, -50, NORTH), 10, 0, 20)[0] is there
+        assert cheapest(one_leg, Pose(10, 150, SOUTH), 10, 0, 20)[0] is back
 
     @pytest.mark.parametrize("heading_rad", [0.3 * k for k in range(21)])
     def test_of_equal_ways_takes_the_first(self, heading_rad: float) -> None:
@@ -157,7 +157,7 @@ class TestShortestSweep:
         north_m = 0.0 if not shorter_m else brentq(lambda y_m: gain_m(y_m) - shorter_m, 0.0, 1.0)
         assert gain_m(north_m) == pytest.approx(shorter_m, abs=1e-9)
         sweep, _ = shortest_sweep(ways, Pose(-30, north_m, WEST), 10)
-        assert sweep.follows is not turned
+        assert sweep is ways[turned]
 
     @given(strips, poses, st.floats(2, 40), st.sampled_from([0.0, 15.0]))
     def test_is_the_shortest_of_the_four_ways(

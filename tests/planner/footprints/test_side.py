@@ -42,7 +42,7 @@ def test_a_look_stands_for_the_track_beside_it_and_is_all_that_a_place_gets() ->
     assert sonar(0, 30).track_length_m(LOOK) == 15
     assert sonar(0, 30).pass_curve(curve) is curve
     assert sonar(0, 30).pass_profile(LOOK, p_detect) is p_detect
-    assert (sonar(0, 30).ahead_m, sonar(0, 30).lead_m, sonar(0, 30).widest_m) == (0, 0, 30)
+    assert (sonar(0, 30).ahead_m, sonar(0, 30).lead_m) == (0, 0)
 
 
 def test_a_looks_reach_is_from_the_first_to_the_last_range_bin_that_saw() -> None:
