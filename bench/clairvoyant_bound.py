@@ -30,12 +30,10 @@ HALVINGS = 60
 
 @dataclass(frozen=True)
 class Bound:
-    """`removed_m2`: no schedule removes more. `price_m2`: what one look at a cell brings at the bound; there are at
-    most `looks` of them."""
+    """`removed_m2`: no schedule removes more. `price_m2`: what one look at a cell brings at the bound."""
 
     removed_m2: float
     price_m2: float
-    looks: float
 
 
 def upper_bound(mission: Removable) -> Bound:
@@ -46,7 +44,7 @@ def upper_bound(mission: Removable) -> Bound:
     there = (worth_m2 > 0) & (p_detect > 0)
     worth_m2, p_detect = worth_m2[there], p_detect[there]
     if not worth_m2.size:
-        return Bound(0.0, 0.0, looks)
+        return Bound(0.0, 0.0)
     dearest, cheapest = float((worth_m2 * p_detect).max()), 0.0
     removed_m2 = float(worth_m2.sum())
     price = dearest
@@ -59,7 +57,7 @@ def upper_bound(mission: Removable) -> Bound:
         else:
             dearest = price
         price = (cheapest + dearest) / 2
-    return Bound(removed_m2, price, looks)
+    return Bound(removed_m2, price)
 
 
 def most_looks(mission: Removable, helper: LegHelper) -> float:

@@ -47,10 +47,6 @@ class Simulator:
         """How much less a schedule makes the objective, times the area."""
         return self.mission.gain_m2(self.left(schedule), self.objective)
 
-    def removed_m2(self, schedule: Schedule) -> float:
-        """The risk that a schedule removes, times the area."""
-        return self.mission.gain_m2(self.left(schedule), OBJECTIVES["mean"])
-
     def left(self, schedule: Schedule) -> FloatArray:
         """The residual risk that a schedule leaves, grid shape: what is passed until the deadline counts."""
         left = self.mission.risk.copy()

@@ -48,8 +48,8 @@ class Recorder:
     """
 
     def __init__(self, config: RecorderConfig) -> None:
-        recording_id = config.recording_id or config.path.absolute().parent.name
-        self._canvas = Canvas(config.path, recording_id, config.live_pipe)
+        run = config.path.absolute().parent.name  # recordings of one id open as one
+        self._canvas = Canvas(config.path, run, config.live_pipe)
         self._config = config
         self._mission: _Mission | None = None
         self._early: list[Received] = []

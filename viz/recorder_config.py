@@ -56,7 +56,6 @@ class LinkTeller(Protocol):
 class RecorderConfig:
     """`path`: the file to write. `story`: makes who tells of the mission in its log.
 
-    `recording_id`: recordings of one id open as one; the name of the file's folder, the run's, if not given.
     `live_pipe`: the named pipe of a LiveServer, to show the mission while it runs; None: the file alone.
     `draw_every_s`: the risk map is drawn at most once in so much simulated time, a very large one once a minute.
     `thresholds`: each survey vehicle's P_d from which data is admissible, drawn with its P(y) where it is told.
@@ -65,7 +64,6 @@ class RecorderConfig:
 
     path: Path
     story: Callable[[], Storyteller]
-    recording_id: str | None = None
     live_pipe: Path | None = None
     draw_every_s: float = 10.0
     thresholds: Mapping[str, float] = field(default_factory=dict)

@@ -155,10 +155,6 @@ class StripTable:
         risk_m2 = [0.0 if one.strip.number in helper.refused else one.risk_m2 for one in strips]
         self.worth_m2 = helper.p_detect * np.array(risk_m2, dtype=np.float64)
 
-    def to_begin_s(self, poses: FloatArray) -> FloatArray:
-        """See `StripWays.to_begin_s`."""
-        return self.ways.to_begin_s(poses)
-
     def removed_m2(self, begins_s: FloatArray, deadline_s: float) -> FloatArray:
         """What services remove by the deadline that begin at these times, shape (n, strips, ways); nothing where the
         battery does not last to their end, and home from there."""

@@ -96,7 +96,7 @@ def without_end(why: str) -> Violation:
 
 
 def _unflown(why: Violation) -> Outcome:
-    return Outcome((why,), digest=None, end_s=0.0, wall_s=0.0)
+    return Outcome((why,), digest=None, end_s=0.0)
 
 
 def fly_number(scenario: Scenario | None, again: int, number: int) -> Outcome:

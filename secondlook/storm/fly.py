@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tempfile
-import time
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -38,14 +37,13 @@ class Outcome:
     """What came of one storm.
 
     `violations`: what did not hold, empty where all did. `digest`: None where the mission did not come to its end.
-    `end_s`: simulated, `wall_s`: real seconds. `reached`: of what is to be tried sometimes, empty where it did not end.
+    `end_s`: simulated. `reached`: of what is to be tried sometimes, empty where it did not end.
     `truth`: of the targets, none where it did not end.
     """
 
     violations: tuple[Violation, ...]
     digest: str | None
     end_s: float
-    wall_s: float
     reached: frozenset[str] = frozenset()
     truth: Truth = Truth()
 
@@ -64,7 +62,6 @@ def fly_storm(plan: TroublePlan, *, bus: Bus = "local", folder: Path | None = No
     if folder is None:
         with tempfile.TemporaryDirectory(prefix="secondlook-storm-") as passing:
             return fly_storm(plan, bus=bus, folder=Path(passing), record=record)
-    began_s = time.perf_counter()
     link = plan.scenario.link
     witness = Witness(may_rise=link is not None and link.maps == "corrected")
     flight: Flight | None = None
@@ -82,7 +79,6 @@ def fly_storm(plan: TroublePlan, *, bus: Bus = "local", folder: Path | None = No
         tuple(violations),
         None if flight is None else flight.digest,
         end_s,
-        time.perf_counter() - began_s,
         frozenset({DISK_FULL} if not violations else ()) if flight is None else reached(flight, witness),
         Truth() if flight is None else _truth_of(flight, plan),
     )

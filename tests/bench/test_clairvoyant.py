@@ -83,16 +83,16 @@ class TestLegs:
         # From (0, -10): 5 m to the run-in, 5 m of it, at 2 m/s.
         assert simulator.begins_s(0, [leg]) == [5.0]
         # Columns 0 and 1, 6 rows, 25 m2, half of it.
-        assert simulator.removed_m2(((leg,),)) == pytest.approx(2 * 6 * 25 * 0.5)
+        assert simulator.gain_m2(((leg,),)) == pytest.approx(2 * 6 * 25 * 0.5)
 
     def test_a_second_look_removes_half_of_what_is_left(self) -> None:
         simulator = Simulator(mission(np.ones((ROWS, COLUMNS)), ends_s=500))
         legs = (Leg(0, 0, ROWS), Leg(0, 0, ROWS, up=False))
-        assert simulator.removed_m2((legs,)) == pytest.approx(2 * 6 * 25 * 0.75)
+        assert simulator.gain_m2((legs,)) == pytest.approx(2 * 6 * 25 * 0.75)
 
     def test_what_is_passed_after_the_deadline_does_not_count(self) -> None:
         simulator = Simulator(mission(np.ones((ROWS, COLUMNS)), ends_s=5.0 + 2 * 2.5))
-        assert simulator.removed_m2(((Leg(0, 0, ROWS),),)) == pytest.approx(2 * 2 * 25 * 0.5)
+        assert simulator.gain_m2(((Leg(0, 0, ROWS),),)) == pytest.approx(2 * 2 * 25 * 0.5)
         assert simulator.in_time(((Leg(0, 0, ROWS), Leg(3, 0, ROWS)),)) == ((Leg(0, 0, ROWS),),)
 
     def test_a_turn_to_the_next_leg_is_a_dubins_path(self) -> None:
@@ -107,9 +107,9 @@ class TestLegs:
         # The line of column 2 lies at 7.5 m: straight on for 5 m to the run-in, and 5 m of that.
         assert simulator.way_m(0, None, Leg(2, 0, ROWS)) == pytest.approx(10)
         # Columns 0 to 3.
-        assert simulator.removed_m2(((Leg(2, 0, ROWS),),)) == pytest.approx(4 * 6 * 25 * 0.5)
+        assert simulator.gain_m2(((Leg(2, 0, ROWS),),)) == pytest.approx(4 * 6 * 25 * 0.5)
         # Columns 0 and 1 alone, the line half a cell outside.
-        assert simulator.removed_m2(((Leg(0, 0, ROWS),),)) == pytest.approx(2 * 6 * 25 * 0.5)
+        assert simulator.gain_m2(((Leg(0, 0, ROWS),),)) == pytest.approx(2 * 6 * 25 * 0.5)
 
     def test_a_leg_across_by_hand(self) -> None:
         beside = replace(helper(), start=Pose(-12.5, 2.5, math.pi / 2))
@@ -118,10 +118,10 @@ class TestLegs:
         # Column 0 begins at -2.5 m, row 0 has its middle at 2.5 m: 5 m to the run-in, 5 m of it, at 2 m/s.
         assert simulator.begins_s(0, [leg]) == [5.0]
         # Rows 0 and 1, 12 columns.
-        assert simulator.removed_m2(((leg,),)) == pytest.approx(2 * 12 * 25 * 0.5)
+        assert simulator.gain_m2(((leg,),)) == pytest.approx(2 * 12 * 25 * 0.5)
         # In 60 s it comes back along column 11, of which it then sees 10 and 11, their first two rows once more.
         back = Leg(COLUMNS - 1, 0, ROWS)
-        assert simulator.removed_m2(((leg, back),)) == pytest.approx(25 * (2 * 12 * 0.5 + 4 * 0.25 + 8 * 0.5))
+        assert simulator.gain_m2(((leg, back),)) == pytest.approx(25 * (2 * 12 * 0.5 + 4 * 0.25 + 8 * 0.5))
 
     def test_the_way_from_a_leg_along_to_one_across_is_a_dubins_path(self) -> None:
         turning = replace(helper(run_in_m=0.0), turn_radius_m=2.5)
@@ -142,13 +142,13 @@ class TestLegs:
     def test_of_a_leg_across_what_is_passed_in_time_counts(self) -> None:
         beside = replace(helper(), start=Pose(-12.5, 2.5, math.pi / 2))
         simulator = Simulator(replace(mission(np.ones((ROWS, COLUMNS)), ends_s=5.0 + 3.4 * 2.5), helpers=(beside,)))
-        assert simulator.removed_m2(((Leg(0, 0, COLUMNS, across=True),),)) == pytest.approx(2 * 3 * 25 * 0.5)
+        assert simulator.gain_m2(((Leg(0, 0, COLUMNS, across=True),),)) == pytest.approx(2 * 3 * 25 * 0.5)
 
     def test_nothing_counts_that_would_begin_after_the_endurance(self) -> None:
         lasting = replace(helper(), lasts_s=10.0)
         simulator = Simulator(replace(mission(np.ones((ROWS, COLUMNS)), ends_s=500), helpers=(lasting,)))
         legs = (Leg(0, 0, ROWS), Leg(0, 0, ROWS, up=False))  # 5 s, and 20 s later
-        assert simulator.removed_m2((legs,)) == pytest.approx(2 * 6 * 25 * 0.5)
+        assert simulator.gain_m2((legs,)) == pytest.approx(2 * 6 * 25 * 0.5)
 
 
 class TestALegOnTheMap:
@@ -196,7 +196,7 @@ class TestALegOnTheMap:
         credited_m2 = float((risk * (1 - fleet_map.risk)).sum()) * 25
         made = Removable(grid, inside, risk, 1050, (flown_by,))
         flown = Leg(4 + swath.left, 20, 32, up, across) if across else Leg(20 + swath.left, 4, 16, up)
-        removed_m2 = Simulator(made).removed_m2(((flown,),))
+        removed_m2 = Simulator(made).gain_m2(((flown,),))
         assert np.count_nonzero(fleet_map.risk < 1) == 12 * width
         assert removed_m2 == pytest.approx(credited_m2, rel=0.005)  # the map tells levels of 0.02
 
@@ -206,7 +206,7 @@ class TestALegOnTheMap:
         grid = build_fleet(scenario, record=False).run_info.grid.spec
         inside = np.ones(grid.shape, dtype=np.bool_)
         everything = Removable(grid, inside, np.ones(grid.shape), 1050, leg_helpers(scenario, grid, inside))
-        assert Simulator(everything).removed_m2(((Leg(20, 0, 80),),)) == pytest.approx(400 * 50 * 0.7)
+        assert Simulator(everything).gain_m2(((Leg(20, 0, 80),),)) == pytest.approx(400 * 50 * 0.7)
 
 
 class TestTheBound:
@@ -234,7 +234,7 @@ class TestTheBound:
 
         for _ in range(40):
             schedule = tuple(tuple(leg() for _ in range(chance.integers(1, 8))) for _ in made.helpers)
-            assert simulator.removed_m2(schedule) <= bound.removed_m2 + 1e-6
+            assert simulator.gain_m2(schedule) <= bound.removed_m2 + 1e-6
 
     def test_by_hand_it_is_as_many_looks_as_there_is_time_for(self) -> None:
         # A helper of 2 m/s flies 60 m in 30 s; half a cell more may be seen, and a quarter turn of 2 m is forgiven.
@@ -274,7 +274,7 @@ class TestTheSearch:
         bound = upper_bound(made)
         best = best_schedule(made, bound, 4_000, seed)
         assert 0.55 * bound.removed_m2 <= best.gain_m2 <= bound.removed_m2 + 1e-6
-        assert best.gain_m2 == pytest.approx(Simulator(made).removed_m2(best.schedule))
+        assert best.gain_m2 == pytest.approx(Simulator(made).gain_m2(best.schedule))
         for leg in best.schedule[0]:
             steps, lines = made.extent(across=leg.across)
             assert 0 <= leg.first < leg.end <= steps
@@ -328,12 +328,12 @@ class TestTheSearch:
         made = mission(risk, ends_s=60, helpers=2)
         known = ((Leg(3, 1, 5), Leg(6, 0, 4, up=False)), (Leg(4, 2, 9, across=True),))
         best = best_schedule(made, upper_bound(made), 100, 1, [known])
-        assert best.gain_m2 >= best.started_m2 >= Simulator(made).removed_m2(known) > 0
+        assert best.gain_m2 >= best.started_m2 >= Simulator(made).gain_m2(known) > 0
 
     @pytest.mark.parametrize("across", [False, True])
     def test_lanes_cover_the_area_once(self, across: bool) -> None:
         made = mission(np.ones((ROWS, COLUMNS)), ends_s=1e6, helpers=2)
-        assert Simulator(made).removed_m2(lanes(made, across=across)) == pytest.approx(made.total_m2 / 2)
+        assert Simulator(made).gain_m2(lanes(made, across=across)) == pytest.approx(made.total_m2 / 2)
 
 
 @pytest.mark.parametrize("other", [["--told"], ["--allocators", "greedy"], ["--set", "mission.rho=1"]])

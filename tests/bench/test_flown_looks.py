@@ -98,7 +98,7 @@ class TestALook:
         look_at(flown, x_m, y_m, heading_rad)
         assert legs_flown(flown.looks, mission) == ((leg,),)
         assert removed_m2(flown, mission) == pytest.approx(4 * 6 * ALL_OF_IT)
-        assert Simulator(mission).removed_m2(((leg,),)) == pytest.approx(4 * 6 * ALL_OF_IT)
+        assert Simulator(mission).gain_m2(((leg,),)) == pytest.approx(4 * 6 * ALL_OF_IT)
 
     @pytest.mark.parametrize("heading_rad", [0.3, 0.8, 2.0, 3.1, 4.4, 6.0])
     def test_at_any_heading(self, heading_rad: float) -> None:

@@ -42,7 +42,7 @@ def test_of_all_ways_the_shortest_is_the_one_that_is_expected(told: Situation) -
     for one in told.helpers:
         table = StripTable(told.strips, one)
         poses = np.array([one.free_at, Pose(50, -20, 2.0)])
-        assert table.to_begin_s(poses).shape == (2, *table.sonar_on_s.shape)
+        assert table.ways.to_begin_s(poses).shape == (2, *table.sonar_on_s.shape)
         to_begin_s, ways = table.ways.shortest_from(poses)
         for row, pose in enumerate(poses.tolist()):
             there = replace(one, free_at=Pose(*pose), free_s=0.0)
@@ -58,7 +58,7 @@ def test_of_ways_that_differ_by_less_than_2_cm_the_first_is_expected() -> None:
     job = open_strip(strip(2, 0, 208, 243, 1.0))
     table = StripTable([job], one)
     to_begin_s, ((way,),) = table.ways.shortest_from(np.array([one.free_at]))
-    ends_s = table.to_begin_s(np.array([one.free_at]))[0, 0] + table.sonar_on_s[0]
+    ends_s = table.ways.to_begin_s(np.array([one.free_at]))[0, 0] + table.sonar_on_s[0]
     assert 0.018 < ends_s[way] - ends_s.min() < 0.02
     assert way < ends_s.argmin()
     assert to_begin_s[0, 0] + table.sonar_on_s[0, way] == ends_s[way]
@@ -107,7 +107,7 @@ class TestByHand:
 
     def test_how_long_it_is_to_the_nearer_end(self) -> None:
         poses = np.array([Pose(0, 0, 0), Pose(0, 400, np.pi)])
-        assert self.TABLE.to_begin_s(poses).min(axis=2) == pytest.approx(np.full((2, 2), 50))
+        assert self.TABLE.ways.to_begin_s(poses).min(axis=2) == pytest.approx(np.full((2, 2), 50))
         assert self.TABLE.sonar_on_s == pytest.approx(np.full(self.TABLE.sonar_on_s.shape, 100))
 
     @pytest.mark.parametrize(
@@ -151,7 +151,7 @@ def test_on_the_way_to_a_strip_the_flow_half_way_there_counts(x_m: float, y_m: f
     grid = FlowGrid(nowhere, axis, nowhere, still, speeds) if north else FlowGrid(axis, nowhere, nowhere, speeds, still)
     one = helper(way_home=WayHome((0, 0), Sailing(2.0, drift_mps=0.9, grid=grid), 6.0))
     table = StripTable([open_strip(strip(1, 30 + x_m, -20 + y_m, heading_rad=heading_rad))], one)
-    to_begin_s = table.to_begin_s(np.array([[30, -20, heading_rad]]))
+    to_begin_s = table.ways.to_begin_s(np.array([[30, -20, heading_rad]]))
     assert to_begin_s[0, 0, 0] == pytest.approx(95 / 2.475 + 5 / 2.9)
 
 
@@ -186,7 +186,7 @@ def test_of_two_ways_that_are_the_same_length_the_first_is_taken() -> None:
     # Midway beside the strip and headed across it: either end is as far.
     one = helper(x_m=-300, y_m=200, heading_rad=np.pi / 2)
     table = StripTable([open_strip(strip(1))], one)
-    to_begin_s = table.to_begin_s(np.array([one.pose]))
+    to_begin_s = table.ways.to_begin_s(np.array([one.pose]))
     assert to_begin_s[0, 0, 0] == pytest.approx(to_begin_s[0, 0, 1])
     _, ways = table.ways.shortest_from(np.array([one.pose]))
     assert ways.tolist() == [[0]]

@@ -113,10 +113,10 @@ def test_each_so_many_th_storm_is_flown_twice_and_over_zenoh(monkeypatch: pytest
 
     def fly(plan: TroublePlan, *, bus: str = "local") -> Outcome:
         flown.append(bus)
-        return Outcome((), f"{bus} {len(flown)}", 20.0, 0.1)
+        return Outcome((), f"{bus} {len(flown)}", 20.0)
 
     monkeypatch.setattr(campaign, "fly_storm", fly)
-    first = Outcome((), "local 1", 20.0, 0.1)
+    first = Outcome((), "local 1", 20.0)
     differs = ("the same digest over Zenoh", "it is zenoh 2 and was local 1")
     for number, buses, told in ((7, [], []), (4, ["local"], []), (40, ["local", "zenoh"], [differs])):
         flown.clear()
@@ -221,7 +221,7 @@ def test_a_planted_bug_is_found(name: str, invariant: str) -> None:
 
 
 def test_what_holds_not_either_without_the_bug_does_not_find_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    wrong = Outcome((Violation("the mission ends", 1.0, "run", "it does not"),), None, 1.0, 0.1)
+    wrong = Outcome((Violation("the mission ends", 1.0, "run", "it does not"),), None, 1.0)
     monkeypatch.setattr("secondlook.storm.canaries.fly_storm", lambda plan: wrong)
     assert find_canary("the deadline is passed over", None, range(3, 5)) == Find(2)
 
@@ -250,7 +250,7 @@ def test_targets_missed_agree_with_those_to_be_expected(missed: int, is_exact: b
     # Two flights: 80 are to be expected, with a variance of 16, so that 3 standard deviations are 12.
     first = Truth(80, missed - 40, 40.0, 8.0, is_exact)
     second = Truth(80, 40, 40.0, 8.0, is_exact)
-    outcomes = {number: Outcome((), "", 1.0, 0.1, truth=one) for number, one in enumerate((first, second))}
+    outcomes = {number: Outcome((), "", 1.0, truth=one) for number, one in enumerate((first, second))}
     assert agreement(outcomes).holds is holds
     assert f"Of 160 targets {missed} were missed, at most 92 were to be expected;" in agreement(outcomes).told
 
