@@ -15,11 +15,12 @@ from pathlib import Path
 from typing import Any
 
 import secondlook
+from secondlook.launch.supervisor import PROGRAM
 
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "docs" / "figures"
-PROGRAM = "from secondlook.installed_command import main; main()"
-"""What a Python of ours does to be the command `secondlook`."""
+BRIEF = ROOT / "tests" / "support" / "brief.yaml"
+"""A mission that is soon over."""
 DIGITS = 6  # of what is kept: more than tables tell
 
 Document = dict[str, Any]

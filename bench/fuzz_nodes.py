@@ -31,12 +31,12 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from bench.flown import BRIEF
 from bench.fuzz_flight import Flight, Found, Said
 from bench.memory import rss_mb
 from secondlook.scenario import Scenario, load_scenario
 from secondlook.storm.fleets import draw_fleet
 
-BRIEF = Path(__file__).parents[1] / "tests" / "support" / "brief.yaml"
 TOLD_EVERY = 20  # flights, where there is no terminal
 MOST_MB_A_FLIGHT = 0.2  # that may be left of each, in the second half of many flights
 

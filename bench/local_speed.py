@@ -27,9 +27,10 @@ import msgpack
 
 import comms.lockstep.drive
 import comms.runner
+from bench.replayed import Nobody, Reciter
 from comms.lockstep.clock import LockstepClock
 from comms.lockstep.local_bus import run_local
-from comms.node import Publication, Received, Step
+from comms.node import Received
 from comms.said.routing import Routing
 from coordinator.coordinator import Coordinator
 from secondlook.fleet.build import build_fleet
@@ -101,39 +102,6 @@ class Account:
 def fly(scenario: Scenario, watch: Callable[[Received], None] | None = None) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         return run_mission(scenario, RunOptions(Path(folder), "local", record=False, watch=watch))
-
-
-class Reciter:
-    """Says again what one node has said, each word at its time."""
-
-    def __init__(self, node_id: str, said: Sequence[Received]) -> None:
-        self._words: dict[int, list[Publication]] = defaultdict(list)
-        for one in said:
-            if one.header.sender == node_id:
-                self._words[one.header.sent_ms].append(Publication(one.key, one.message))
-        self._times_ms = sorted(self._words, reverse=True)
-
-    def start(self, now_ms: int) -> Step:
-        return self.on_wake(now_ms)
-
-    def on_message(self, received: Received, now_ms: int) -> Step:
-        return Step(wake_ms=self._times_ms[-1] if self._times_ms else None)
-
-    def on_wake(self, now_ms: int) -> Step:
-        publish: list[Publication] = []
-        while self._times_ms and self._times_ms[-1] <= now_ms:
-            publish += self._words[self._times_ms.pop()]
-        return Step(tuple(publish), self._times_ms[-1] if self._times_ms else None)
-
-
-class Nobody:
-    """A listener that does nothing with what it hears."""
-
-    def on_message(self, received: Received) -> None:
-        pass
-
-    def close(self) -> None:
-        pass
 
 
 def bare_loop_s(said: Sequence[Received]) -> float:

@@ -34,13 +34,12 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from bench.flown import as_options
+from bench.flown import BRIEF, as_options
 from bench.recorder_cost import SLOW
 from secondlook.fleet.nodes import COORDINATOR, RECORDER, WORLD
 from secondlook.launch.mission import RunOptions, run_mission
 from secondlook.scenario import Scenario, load_scenario
 
-BRIEF = Path(__file__).parents[1] / "tests" / "support" / "brief.yaml"
 WARM_UP = 10  # missions: modules, caches, and what the allocator keeps for later
 SAMPLE_EVERY_S, FREEZE_EVERY_S, FROZEN_S = 10.0, 30.0, 8.0
 FIRST_MINUTES = 3

@@ -24,7 +24,8 @@ from pathlib import Path
 import numpy as np
 
 from bench.clearance_tables import BOTH, CLUTTER, FALSE_ALARMS, NONE_LEFT
-from bench.flown import PROGRAM, Case, as_options
+from bench.flown import Case, as_options
+from secondlook.launch.supervisor import PROGRAM
 from secondlook.scenario.bundled import scenario_names
 
 BUNDLED = [name for name in scenario_names() if name != "armada"]

@@ -38,15 +38,15 @@ from rich.console import Console
 from rich.table import Table
 
 import secondlook
-from bench.flown import PROGRAM, as_options
-from bench.replayed import ReplayedConfig
+from bench.flown import as_options
+from bench.replayed import Nobody, ReplayedConfig
 from comms.lockstep.drive import Lockstep
-from comms.node import Received
 from comms.said.announcement import Role
 from secondlook.fleet.build import build_fleet
 from secondlook.fleet.nodes import RECORDER, NodeSpec, node_spec
 from secondlook.launch.mission import recorder_config
 from secondlook.launch.processes import Processes
+from secondlook.launch.supervisor import PROGRAM
 from secondlook.scenario import load_scenario
 
 SLOW = "tellaro:vehicles.primary.speed_mps=0.15:vehicles.helper.speed_mps=0.2:vehicles.primary.endurance_s=360000"
@@ -128,7 +128,7 @@ def replay(run: Path) -> bool:
     with tempfile.TemporaryDirectory(prefix="secondlook-cost-") as folder:
         recording = Path(folder) / "mission.rrd"
         again[RECORDER] = node_spec(Role.RECORDER, recorder_config(scenario, recording))
-        processes = Processes(replace(fleet, specs=again), Path(folder), _Nobody(), Lockstep(), processes=1)
+        processes = Processes(replace(fleet, specs=again), Path(folder), Nobody(), Lockstep(), processes=1)
         with processes, _sampling(lambda: processes.process_ids.get(RECORDER), reference) as samples:
             processes.run()
         recording_mb = recording.stat().st_size / 1e6
@@ -168,16 +168,6 @@ def _sampling(
     finally:
         over.set()
         thread.join()
-
-
-class _Nobody:
-    """An observer that takes no note."""
-
-    def on_message(self, received: Received) -> None:
-        pass
-
-    def close(self) -> None:
-        pass
 
 
 def _share(cpu_s: float, mission_s: float) -> float:

@@ -27,7 +27,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from bench.flown import as_options
+from bench.flown import BRIEF, as_options
 from comms.keys import RunKeys
 from comms.node import Received
 from comms.runner import Intake
@@ -50,7 +50,6 @@ from secondlook.recorded.metrics import Metrics
 from secondlook.recorded.mission_files import read_messages
 from secondlook.scenario import Scenario, load_scenario
 
-BRIEF = Path(__file__).parents[1] / "tests" / "support" / "brief.yaml"
 ROUTER = "router"
 PATIENCE_S = 120.0
 PHASES = ("before start", "surveying", "offered", "under way", "done", "over")

@@ -18,9 +18,9 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from bench.flown import PROGRAM
+from bench.flown import BRIEF
+from secondlook.launch.supervisor import PROGRAM
 
-BRIEF = Path(__file__).parents[1] / "tests" / "support" / "brief.yaml"
 BY_THE_WALL_CLOCK = ["time.wall_s", "time.real_time_factor"]
 LATEST_S = 6.0
 

@@ -23,6 +23,8 @@ from secondlook.launch.signals import signals_ask
 
 SUPERVISOR_FD, STARTS = "SECONDLOOK_SUPERVISOR_FD", "SECONDLOOK_STARTS"  # environment variables of the process
 OVER, AGAIN = b"over\n", b"again\n"  # what it says
+PROGRAM = "from secondlook.installed_command import main; main()"
+"""What a Python of ours does to be the command `secondlook`."""
 
 
 class Supervisor:
@@ -30,13 +32,7 @@ class Supervisor:
 
     def __init__(self, name: str, arguments: Sequence[str]) -> None:
         self._name = name
-        self._command = [
-            sys.executable,
-            "-P",
-            "-c",
-            "from secondlook.installed_command import main; main()",
-            *arguments,
-        ]
+        self._command = [sys.executable, "-P", "-c", PROGRAM, *arguments]
         self._restarts = Restarts()
         self._asked_to_end = threading.Event()
         self._process: subprocess.Popen[bytes] | None = None

@@ -11,8 +11,9 @@ from typing import Any
 import pytest
 
 from bench import turns
+from bench.flown import BRIEF
 from bench.fuzz_flight import Flight, Said
-from bench.fuzz_nodes import BRIEF, corpus_of, fuzz
+from bench.fuzz_nodes import corpus_of, fuzz
 from bench.turns import HangsError, Turns
 from comms.said.messages import Contact
 from comms.said.topics import topic_of

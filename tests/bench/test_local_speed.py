@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from bench import local_speed
-from bench.local_speed import PARTS, Account, Reciter
+from bench.local_speed import PARTS, Account
+from bench.replayed import Reciter
 from comms.node import Publication, Received
 from comms.said.codec import Header
 from comms.said.messages import MissionOver
