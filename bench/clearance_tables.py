@@ -208,7 +208,7 @@ def draw_reliability(document: Document) -> None:
 
 def reliability_lines(document: Document) -> list[str]:
     """A line for each case."""
-    lines = ["| `scenario` | otherwise | missed | predicted | calibration error |", f"|{'---|' * 5}"]
+    lines = head(["scenario"], ("otherwise", "missed", "predicted", "calibration error"))
     for row in document["rows"]:
         bins = reliability_bins(row)
         count = sum(one.targets for one in bins)
@@ -216,7 +216,7 @@ def reliability_lines(document: Document) -> list[str]:
         told = [one for one in row["overrides"] if one != RELIABLE_TARGETS]
         error = predicted_risk.calibration_error(bins)
         words = " ".join(f"`{one}`" for one in told) or "-"
-        lines.append(f"| `{row['scenario']}` | {words} | {missed:.3f} | {predicted:.3f} | {error:.3f} |")
+        lines.append(line([row["scenario"]], [words, f"{missed:.3f}", f"{predicted:.3f}", f"{error:.3f}"]))
     return lines
 
 

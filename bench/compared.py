@@ -7,8 +7,10 @@ objective.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
+
+from bench.rows import head, line
 
 HEAD = (
     "scenario", "contender", "mean", "worst 30 %", "mean above {first}'s (95 %)", "worst 30 % above {first}'s (95 %)",
@@ -19,15 +21,15 @@ HEAD = (
 def table(comparisons: Sequence[Mapping[str, Any]]) -> str:
     """The table of some comparisons, each as in `compare.json`, that have the first contender in common."""
     first = f"`{comparisons[0]['contenders'][0]['name']}`"
-    lines = [_line(one.format(first=first) for one in HEAD), "|" + "---|" * len(HEAD)]
+    lines = head((), [one.format(first=first) for one in HEAD])
     for told in comparisons:
         for one in told["contenders"]:
             pairs = one["against_first"]
             judged = pairs.get(told["objective"])
-            cells = [f"`{told['scenario']}`", f"`{one['name']}`"]
-            cells += [f"{one[figure]['mean']:.3f}" for figure in ("mean_end", "worst30_mean_end")]
+            cells = [f"{one[figure]['mean']:.3f}" for figure in ("mean_end", "worst30_mean_end")]
             cells += [_difference(pairs.get(figure)) for figure in ("mean", "worst30")]
-            lines.append(_line([*cells, f"{judged['worse']}, {judged['better']}" if judged else ""]))
+            cells.append(f"{judged['worse']}, {judged['better']}" if judged else "")
+            lines.append(line((told["scenario"], one["name"]), cells))
     return "\n".join(lines)
 
 
@@ -37,7 +39,3 @@ def _difference(pair: Mapping[str, Any] | None) -> str:
         return ""
     above = f"{pair['difference']:+.3f}"
     return above if pair["low"] is None else f"{above} ({pair['low']:+.3f}, {pair['high']:+.3f})"
-
-
-def _line(cells: Iterable[str]) -> str:
-    return "| " + " | ".join(cells) + " |"

@@ -19,16 +19,16 @@ from concurrent.futures import ProcessPoolExecutor
 from itertools import product
 from pathlib import Path
 from statistics import fmean
-from typing import Any
 
 import numpy as np
 from matplotlib import pyplot
 
+from bench.flown import Document, some
+from bench.rows import head, line
 from secondlook.fleet.link import link_times
 from secondlook.scenario import load_scenario
 from secondlook.testing import Fleet
 
-Document = dict[str, Any]
 SCENARIOS = ("tellaro", "two-helpers", "patchy")
 SEEDS = (1001, 1002, 1003, 1004)
 BITS_PER_S = (5, 10, 20, 40, 80, 160)
@@ -39,7 +39,6 @@ SETTINGS = {
     "by worth, maps as stretches": (),
 }
 """What of a link differs between the lines of the curve."""
-DIGITS = 6
 
 
 def modem(rate_bps: float) -> str:
@@ -78,7 +77,7 @@ def _fly_rates(scenario: str, seed: int) -> list[Document]:
         row |= {"share": share, "risk.mean": flown["risk"]["mean"]}
         row |= {"risk.worst30_mean": flown["risk"]["worst30_mean"], "overrides": set_}
         row["bytes_per_s"] = flown["link"]["bytes_per_s"]
-        rows.append({key: round(one, DIGITS) if isinstance(one, float) else one for key, one in row.items()})
+        rows.append(some(row, row))
         print(f"{scenario} {seed}, {bits_per_s} bits a second, {setting}: {share:.3f}", flush=True)
     return rows
 
@@ -99,9 +98,9 @@ def shares(rows: Iterable[Document]) -> dict[str, dict[int, list[float]]]:
 def table(rows: Sequence[Document]) -> list[str]:
     """The lines of the table, as Markdown."""
     rates = sorted({row["bits_per_s"] for row in rows})
-    lines = [f"| bits a second | {' | '.join(map(str, rates))} |", f"|{'---|' * (len(rates) + 1)}"]
+    lines = head((), ["bits a second", *map(str, rates)])
     for setting, by_rate in shares(rows).items():
-        lines.append(f"| {setting} | {' | '.join(f'{fmean(by_rate[one]):.3f}' for one in rates)} |")
+        lines.append(line((), [setting, *(f"{fmean(by_rate[one]):.3f}" for one in rates)]))
     return lines
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from bench.flown import Document, some
-from bench.rows import Row
+from bench.rows import Row, head, line
 from secondlook.testing import Fleet
 
 SCENARIO, SEED = "tellaro", 7
@@ -45,10 +45,10 @@ def _flown(profile: str, maps: str) -> Row:
 
 def table(rows: Sequence[Row]) -> list[str]:
     """A line for each: by how much the risk of a cell is off, the bytes a second, and what the fleet leaves."""
-    lines = ["| link.profile | link.maps | off a cell, mean | largest | bytes a second | mean residual risk |"]
-    lines.append(f"|{'---|' * 6}")
+    titles = "link.profile", "link.maps", "off a cell, mean", "largest", "bytes a second", "mean residual risk"
+    lines = head((), titles)
     for row in rows:
         profile, maps, _ = (one.partition("=")[2] for one in row["overrides"])
-        figures = f"{row['off.mean']:.3f} | {row['off.largest']:.2f} | {row['link.bytes_per_s']:.1f}"
-        lines.append(f"| `{profile}` | `{maps}` | {figures} | {row['risk.mean']:.3f} |")
+        off = f"{row['off.mean']:.3f}", f"{row['off.largest']:.2f}"
+        lines.append(line((profile, maps), [*off, f"{row['link.bytes_per_s']:.1f}", f"{row['risk.mean']:.3f}"]))
     return lines

@@ -15,11 +15,10 @@ from __future__ import annotations
 import sys
 from collections import defaultdict
 from statistics import fmean
-from typing import Any
 
 import secondlook
+from bench.rows import Row, head, line
 
-Row = dict[str, Any]
 LINK, IDEAL = "link.profile", "ideal"
 NAMED = {"coordinator.platform": "coordinator on", "link.also": "and"}
 
@@ -70,14 +69,14 @@ def table(rows: list[Row], varied: list[str]) -> list[str]:
     """The lines of the table, as Markdown. Raises ValueError as `shares` does."""
     names = [NAMED.get(key, f"`{key}`") for key in varied]
     heads = [*names, "missions", "share kept", "least", "of the worst 30 %", "bytes a second", "age in s"]
-    lines = [f"| {' | '.join(heads)} |", f"|{'---|' * len(heads)}"]
+    lines = head((), heads)
     of_worst = shares(rows, varied, "worst30_mean")
     for values, missions in shares(rows, varied).items():
         kept, worst = [share for _, share in missions], fmean(share for _, share in of_worst[values])
         bytes_per_s, age_s = (fmean(of(row) for row, _ in missions) for of in (_bytes_per_s, _age_s))
-        told = " | ".join(one if " " in one or one == "-" else f"`{one}`" for one in values)
-        cells = f"{fmean(kept):.3f} | {min(kept):.3f} | {worst:.3f} | {bytes_per_s:.1f} | {age_s:.0f}"
-        lines.append(f"| {told} | {len(kept)} | {cells} |")
+        told = [one if " " in one or one == "-" else f"`{one}`" for one in values]
+        shown = [f"{fmean(kept):.3f}", f"{min(kept):.3f}", f"{worst:.3f}", f"{bytes_per_s:.1f}", f"{age_s:.0f}"]
+        lines.append(line((), [*told, str(len(kept)), *shown]))
     return lines
 
 

@@ -9,7 +9,7 @@ from statistics import fmean
 import secondlook
 from bench import link_curve, link_maps, link_share
 from bench.flown import Document, Mission, Table, as_options, call_secondlook, figures_left, fly_overridden, kept, some
-from bench.rows import MISSION
+from bench.rows import MISSION, head, line
 
 LINKED = ("tellaro", "two-helpers", "patchy")
 LINKED_SEEDS = "1001..1020"
@@ -82,15 +82,15 @@ def lanes_lines(document: Document) -> list[str]:
     table."""
     linked = kept("across-the-water")["rows"]
     ideal = [row for row in linked if row["link.profile"] == "ideal" and row["coordinator.platform"] == "ship"]
-    lines = ["| lanes, told beforehand | missions | share kept | least | of the worst 30 % |", f"|{'---|' * 5}"]
+    lines = head((), ("lanes, told beforehand", "missions", "share kept", "least", "of the worst 30 %"))
     for words, told in LANES.items():
         lanes = [row | {"link.profile": words} for row in document["rows"] if row["overrides"] == [told]]
         of_mean, of_worst = (
             [share for _, share in link_share.shares([*ideal, *lanes], ["link.profile"], of)[words,]]
             for of in ("mean", "worst30_mean")
         )
-        figures = f"{fmean(of_mean):.3f} | {min(of_mean):.3f} | {fmean(of_worst):.3f}"
-        lines.append(f"| {words} | {len(of_mean)} | {figures} |")
+        figures = f"{fmean(of_mean):.3f}", f"{min(of_mean):.3f}", f"{fmean(of_worst):.3f}"
+        lines.append(line((), [words, str(len(of_mean)), *figures]))
     return lines
 
 

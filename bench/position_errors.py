@@ -10,13 +10,11 @@ is what second looks take off the primaries' mean there.
 from __future__ import annotations
 
 import sys
-import tempfile
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import product
-from pathlib import Path
 from statistics import fmean
 
 import numpy as np
@@ -29,7 +27,7 @@ from comms.said.messages import Look, Nav, TruthPose
 from planner.region import Region
 from planner.risk import residual_risk, risk_statistics
 from planner.types import FloatArray, GridSpec, Point
-from secondlook.launch.mission import RunOptions, run_mission
+from secondlook.launch.mission import run_in_passing
 from secondlook.scenario import load_scenario
 from vehicle_agent.coverage import CoverageLayer
 
@@ -89,9 +87,7 @@ def fly(scenario: str, overrides: Sequence[str], seed: int) -> Row:
     """One mission: beside its own figures the mean residual risk by true positions, that which the fleet leaves, and
     the primaries alone."""
     truth = TrueMap()
-    with tempfile.TemporaryDirectory() as folder:
-        options = RunOptions(Path(folder), "local", None, record=False, watch=truth.hear)
-        told = run_mission(load_scenario(scenario, overrides, seed), options)["risk"]
+    told = run_in_passing(load_scenario(scenario, overrides, seed), watch=truth.hear)["risk"]
     true, alone = truth.mean_risk(Role.SURVEY, Role.REVISIT), truth.mean_risk(Role.SURVEY)
     figures = {"risk.mean": told["mean"], "risk.worst30_mean": told["worst30_mean"]}
     figures |= {"true.mean": true, "true_alone.mean": alone}

@@ -85,9 +85,9 @@ def fly(scenario: str, overrides: Sequence[str], seed: int) -> Met:
     return Met(risk, missed, {"risk.mean": left.mean, "risk.worst30_mean": left.worst30_mean, **truth})
 
 
-def fly_all(scenario: str, overrides: Sequence[str], missions: int, jobs: int = 2) -> Met:
+def fly_all(scenario: str, overrides: Sequence[str], missions: int) -> Met:
     """Missions with the seeds from 1 on."""
-    with ProcessPoolExecutor(max_workers=jobs) as pool:
+    with ProcessPoolExecutor(max_workers=2) as pool:
         flown = list(pool.map(partial(fly, scenario, overrides), range(1, missions + 1)))
     risk, missed = (np.concatenate(parts) for parts in zip(*((one.risk, one.missed) for one in flown), strict=True))
     return Met(risk, missed, flown[0].left)

@@ -6,14 +6,12 @@ python -m bench.single_tracks [SCENARIO [SEEDS]]; prints one row a seed where th
 from __future__ import annotations
 
 import sys
-import tempfile
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from planner.spacing_planners import AdaptiveSpacing, SpacingDecision
-from secondlook.launch.mission import RunOptions, run_mission
+from secondlook.launch.mission import run_in_passing
 from secondlook.scenario import load_scenario
 
 
@@ -32,9 +30,7 @@ COLUMNS = ("tracks", "primary_s", "primary unseen", "primary mean", "fleet unsee
 
 
 def fly(scenario: str, seed: int, *settings: str) -> tuple[dict[str, Any], list[float]]:
-    with tempfile.TemporaryDirectory() as folder:
-        options = RunOptions(Path(folder), "local", None, record=False)
-        told = run_mission(load_scenario(scenario, settings, seed), options)
+    told = run_in_passing(load_scenario(scenario, settings, seed))
     alone, fleet = told["risk_primary_alone"], told["risk"]
     row = [
         float(sum(vehicle.get("tracks", 0) for vehicle in told["vehicles"].values())),
