@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field, ValidationInfo, field_validator
 
@@ -139,20 +139,8 @@ AnyTrouble = Annotated[
     Kill | Join | DiskFull | Freeze | CutOff | Blackout | RangeCut | Jammed | DropOrCorrupt | Repeat | Delay | Reorder,
     Field(discriminator="what"),
 ]
-KINDS = (
-    "kill",
-    "join",
-    "disk_full",
-    "freeze",
-    "cut_off",
-    "blackout",
-    "range_cut",
-    "jammed",
-    "drop",
-    "corrupt",
-    "repeat",
-    "delay",
-    "reorder",
+KINDS: tuple[str, ...] = tuple(
+    what for one in get_args(get_args(AnyTrouble)[0]) for what in get_args(one.model_fields["what"].annotation)
 )
 
 
