@@ -11,7 +11,7 @@ import numpy as np
 
 from bench.removable import LegHelper, Removable
 from coordinator.cut.ground import OBJECTIVES, Objective
-from planner.dubins import Pose, shortest_path
+from planner.dubins import Pose, shifted, shortest_path
 from planner.types import FloatArray
 
 
@@ -99,10 +99,9 @@ class Simulator:
             pose = Pose(across_m, along_m, flown_by.start.heading_rad - frame.heading_rad)
         else:
             pose = self._pose(flown_by, before, before.end if before.up else before.first)
-        x_m, y_m, heading_rad = self._pose(flown_by, leg, leg.first if leg.up else leg.end)
-        run_in_m = flown_by.run_in_m
-        begin = Pose(x_m - run_in_m * math.sin(heading_rad), y_m - run_in_m * math.cos(heading_rad), heading_rad)
-        return shortest_path(pose, begin, flown_by.turn_radius_m).length_m + run_in_m
+        first = self._pose(flown_by, leg, leg.first if leg.up else leg.end)
+        begin = shifted(first[:2], first.heading_rad, -flown_by.run_in_m)
+        return shortest_path(pose, begin, flown_by.turn_radius_m).length_m + flown_by.run_in_m
 
     def _pose(self, flown_by: LegHelper, leg: Leg, edge: int) -> Pose:
         """On a leg, at the edge before a row, or a column if it lies across; sweep frame."""

@@ -12,10 +12,10 @@ from comms.said.announcement import Role, RosterVehicle
 from comms.said.messages import FARTHEST_M, AgentState, Mode, TaskState, TaskStatus
 from modem.config import ModemConfig
 from modem.layers import MOST_LEGS
-from planner.dubins import Pose
+from planner.dubins import Pose, shifted
 from planner.footprints import footprint_of
 from planner.keep_out import NOWHERE, KeepOut
-from planner.sweep import NoSweepError, Sweep, shifted, shortest_sweep, sweeps_by
+from planner.sweep import NoSweepError, Sweep, shortest_sweep, sweeps_by
 from planner.types import Point, Strip
 
 STATE_BITS = 80

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.rounding import rounded
-from planner.types import FloatArray
+from planner.types import FloatArray, Point
 
 _FULL_TURN_RAD = 2 * math.pi
 _ANGLE_TOLERANCE_RAD = 1e-10
@@ -117,6 +117,13 @@ def along_arc(start: Pose, length_m: float, turned_rad: float) -> Pose:
         start.x_m + chord_m * math.sin(chord_heading_rad),
         start.y_m + chord_m * math.cos(chord_heading_rad),
         start.heading_rad + turned_rad,
+    )
+
+
+def shifted(point: Point, heading_rad: float, distance_m: float) -> Pose:
+    """The pose a distance ahead of a point, negative for behind it."""
+    return Pose(
+        point[0] + distance_m * math.sin(heading_rad), point[1] + distance_m * math.cos(heading_rad), heading_rad
     )
 
 

@@ -10,10 +10,10 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from planner.dubins import Pose
+from planner.dubins import Pose, shifted
 from planner.keep_out import TOUCHES_M, KeepOut
 from planner.region import ON_BOUNDARY_M, Region
-from planner.sweep import pass_over, shifted
+from planner.sweep import pass_over
 from planner.types import BoolArray, GridSpec, Point, Track
 
 SHORTEST_PIECE_M = 20.0

@@ -9,7 +9,7 @@ from functools import lru_cache
 from itertools import pairwise
 from typing import NamedTuple
 
-from planner.dubins import TIE_M, Pose
+from planner.dubins import TIE_M, Pose, shifted
 from planner.footprints.footprint import Footprint
 from planner.keep_out import NOWHERE, KeepOut
 from planner.types import Point, Strip, SweepFrame, Track
@@ -162,10 +162,3 @@ def distance_over(pose: Pose, passes: Sequence[Pass], turn_radius_m: float, keep
         return 0.0
     way_m = way_length_m(way_or_direct(pose, passes[0].begin, turn_radius_m, keep_out))
     return way_m + length_over(passes, turn_radius_m, keep_out)
-
-
-def shifted(point: Point, heading_rad: float, distance_m: float) -> Pose:
-    """The pose a distance ahead of a point, negative for behind it."""
-    return Pose(
-        point[0] + distance_m * math.sin(heading_rad), point[1] + distance_m * math.cos(heading_rad), heading_rad
-    )

@@ -17,7 +17,7 @@ from functools import lru_cache
 import numpy as np
 import shapely
 
-from planner.dubins import TIE_M, DubinsPath, Pose, path_lengths_m, shortest_path
+from planner.dubins import TIE_M, DubinsPath, Pose, path_lengths_m, shifted, shortest_path
 from planner.keep_out import KeepOut
 from planner.types import BoolArray, FloatArray, Point
 
@@ -70,7 +70,7 @@ def _way_round(start: Pose, end: Pose, turn_radius_m: float, keep_out: KeepOut) 
     for first_m, last_m in sorted(
         ((one * turn_radius_m, other * turn_radius_m) for one in STRAIGHT_FIRST for other in STRAIGHT_FIRST), key=sum
     ):
-        begin, arrive = _shifted(start, first_m), _shifted(end, -last_m)
+        begin, arrive = shifted(start[:2], start.heading_rad, first_m), shifted(end[:2], end.heading_rad, -last_m)
         lead_in, lead_out = _straight(start, first_m, turn_radius_m), _straight(arrive, last_m, turn_radius_m)
         if keep_out.is_clear([*lead_in, *lead_out]):
             found = graph.way(begin, arrive)
@@ -286,12 +286,6 @@ def _back(
         found.append(last)
         last = came[last]
     return tuple(reversed(found))
-
-
-def _shifted(pose: Pose, ahead_m: float) -> Pose:
-    return pose._replace(
-        x_m=pose.x_m + ahead_m * math.sin(pose.heading_rad), y_m=pose.y_m + ahead_m * math.cos(pose.heading_rad)
-    )
 
 
 def _straight(pose: Pose, length_m: float, turn_radius_m: float) -> Way:

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from planner.currents import Current, made_good_mps
-from planner.dubins import Pose, along_arc, compass_rad
+from planner.dubins import Pose, along_arc, compass_rad, shifted
 from planner.keep_out import NOWHERE, KeepOut
 from planner.types import Point
 from planner.ways import Way, shortest_way
@@ -341,9 +341,7 @@ class Motion:
             NoWayError: the track or its runs enter ground to keep out of, or no way there stays out of it.
         """
         heading_rad, length_m = bearing_rad(start, end), math.dist(start, end)
-        run_in = Pose(
-            start[0] - run_in_m * math.sin(heading_rad), start[1] - run_in_m * math.cos(heading_rad), heading_rad
-        )
+        run_in = shifted(start, heading_rad, -run_in_m)
         whole = Arc(run_in, length_m + 2 * run_in_m)
         if not self._nearest.is_room(run_in, whole.pose_at(whole.length_m), self._turn_radius_m):
             raise NoWayError("the track, with its runs and turns, enters ground to keep out of")

@@ -23,12 +23,12 @@ from comms.said.messages import (
     TaskAction,
 )
 from comms.said.topics import CONTACT, MANEUVER, STATE
-from planner.dubins import Pose
+from planner.dubins import Pose, shifted
 from planner.footprints.footprint import Footprint
 from planner.keep_out import NOWHERE, KeepOut
 from planner.reckoning import Course
 from planner.region import Region
-from planner.sweep import pass_over, shifted
+from planner.sweep import pass_over
 from planner.types import Point, Strip, SweepFrame, Track
 from vehicle_agent.config import Homing
 from vehicle_agent.coverage import CoverageLayer

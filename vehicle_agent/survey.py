@@ -24,6 +24,7 @@ from comms.said.tally import tally
 from comms.said.topics import CURVE, HOTSPOT, PLAN
 from planner.area import lawnmower
 from planner.curve import NEWEST_CURVES, RangeTally, effective_range_m, mean_curve
+from planner.dubins import shifted
 from planner.first_plan import parts_in_order
 from planner.flyable import flyable_pieces
 from planner.footprints.cells import Ahead, cells_within, settled_cells
@@ -32,7 +33,7 @@ from planner.hotspots import HotspotMap, blocks_about, update_hotspots
 from planner.profile_spacing import Known, SpacingTerms, known_before
 from planner.risk import HIGHEST_P_DETECT, residual_risk
 from planner.spacing_planners import SpacingDecision
-from planner.sweep import Pass, pass_over, shifted
+from planner.sweep import Pass, pass_over
 from planner.types import BoolArray, DetectionCurve, FloatArray, Track
 from vehicle_agent.agent import Agent
 from vehicle_agent.config import WHOLE, SurveyConfig

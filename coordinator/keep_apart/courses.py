@@ -13,9 +13,9 @@ from comms.said.announcement import RosterVehicle
 from comms.said.messages import AgentState, Mode, Plan, PlannedTrack
 from coordinator.vehicles import pass_of, pose_of, sailing_of, tracks_of
 from planner.currents import FlowGrid, Sailing
-from planner.dubins import DubinsPath, Pose, poses_along
+from planner.dubins import DubinsPath, Pose, poses_along, shifted
 from planner.keep_out import NOWHERE, KeepOut
-from planner.sweep import Pass, shifted
+from planner.sweep import Pass
 from planner.types import FloatArray
 from planner.ways import way_or_direct
 

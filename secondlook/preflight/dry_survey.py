@@ -12,8 +12,8 @@ from comms.said.announcement import RunInfo
 from comms.said.codec import Header
 from comms.said.messages import MOST_TRACKS, Look, Maneuver, ManeuverStatus, Mode, Nav
 from comms.said.topics import LOOK, MANEUVER_STATUS, NAV, RUN, Topic
+from planner.dubins import shifted
 from planner.keep_out import KeepOut
-from planner.sweep import shifted
 from sim_world.config import VehicleConfig
 from sim_world.looks import Looks
 from sim_world.sonar import Seabed
