@@ -76,7 +76,7 @@ class Fuzzer:
             return
         self._said.setdefault(found[0], deque(maxlen=REMEMBERED)).append((key, payload))
         header = header_of(payload)
-        self._last[header.sender] = header.incarnation, header.sequence
+        self._last[header.sender] = header.newness
 
     @property
     def can_draw(self) -> bool:

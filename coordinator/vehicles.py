@@ -219,7 +219,7 @@ class KnownVehicle:
 
     def hear_state(self, header: Header, state: AgentState, now_ms: int) -> bool:
         """Hears its state; returns False, and changes nothing, for one that is not newer than the newest."""
-        order = (header.incarnation, header.sequence)
+        order = header.newness
         if order <= self._state_order:
             return False
         if header.incarnation > self._state_order[0]:  # started anew: it may do better
@@ -257,7 +257,7 @@ class KnownVehicle:
         return True
 
     def _hear_curve(self, header: Header, curve: Curve) -> bool:
-        order = (header.incarnation, header.sequence)
+        order = header.newness
         measured = curve.detection_curve
         if measured is None or order <= self._curve_orders.get(curve.track, _NONE_YET):
             return False
@@ -307,7 +307,7 @@ class KnownVehicle:
 
     def hear_word_of(self, strip: int, header: Header) -> bool:
         """Notes a message about a strip; whether it is newer than all that it had told of it."""
-        order = (header.incarnation, header.sequence)
+        order = header.newness
         if order <= self._task_orders.get(strip, _NONE_YET):
             return False
         self._task_orders[strip] = order
@@ -332,7 +332,7 @@ class KnownVehicle:
 
     def has_told_since(self, header: Header, strip: int) -> bool:
         """Whether it has said something of a strip after it sent a message."""
-        return self._task_orders.get(strip, _NONE_YET) > (header.incarnation, header.sequence)
+        return self._task_orders.get(strip, _NONE_YET) > header.newness
 
     def is_not_for_it(self, record: StripRecord) -> bool:
         """Whether it has refused this strip as it is, or failed at its place."""

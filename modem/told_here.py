@@ -54,7 +54,7 @@ class ToldHere:
         if isinstance(message, AgentState):
             if self._is_overtaken(platform, header):
                 return  # another has overtaken it, or its word on a task, which tells what it does since
-            self._newest[platform] = _order(header)
+            self._newest[platform] = header.newness
             header = self._in_order(platform, header, now_ms)
             self._presences[platform].hear_state(message, header.incarnation, said.header.sent_ms)
         elif isinstance(message, TaskStatus):
@@ -62,7 +62,7 @@ class ToldHere:
             tells = not is_old and self._presences[platform].hear_status(message, now_ms)
             strip = self._presences[platform].strips.get(message.strip) if message.state is TaskState.DONE else None
             if tells:
-                self._newest[platform] = _order(header)
+                self._newest[platform] = header.newness
             # The map is told before the word.
             self._say_tiles(platform, header, self._layers.hear_done(platform, header.incarnation, strip))
         if topic is not None:
@@ -90,7 +90,7 @@ class ToldHere:
     def _is_overtaken(self, platform: str, header: Header) -> bool:
         """Whether a vehicle has told newer things of itself or its work, which have come. Small frames keep the
         order."""
-        return not self._config.is_small and _order(header) < self._newest.get(platform, _order(header))
+        return not self._config.is_small and header.newness < self._newest.get(platform, header.newness)
 
     def _in_order(self, platform: str, header: Header, now_ms: int) -> Header:
         """A state's header as it is told here: one that was reckoned before does not make it an old one."""
@@ -101,10 +101,6 @@ class ToldHere:
         if header.incarnation >= before.incarnation:
             self._state_headers[platform], self._state_told_ms[platform] = header, now_ms
         return header
-
-
-def _order(header: Header) -> tuple[int, int]:
-    return header.incarnation, header.sequence
 
 
 def layer_start(incarnation: int, start: int) -> int:

@@ -286,7 +286,7 @@ class Agent:
 
     def _is_for_now(self, header: Header) -> bool:
         """Whether a task is for who is here now, and newer than all that were; takes note of it."""
-        order = (header.incarnation, header.sequence)
+        order = header.newness
         # Of what has come by modem the second alone is known in which it was said.
         if header.sent_ms < self._started_ms // 1000 * 1000 or order <= self._task_order:
             return False

@@ -55,6 +55,11 @@ class Header(NamedTuple):
         """The order in which messages are handled: by send time, then the clock's first, then sender and sequence."""
         return self.sent_ms, self.sender != CLOCK, self.sender, self.incarnation, self.sequence
 
+    @property
+    def newness(self) -> tuple[int, int]:
+        """Of two messages of one sender the newer has more."""
+        return self.incarnation, self.sequence
+
 
 def encode(header: Header, message: Message) -> bytes:
     """The payload of a message; raises WireError where a field does not fit."""

@@ -110,14 +110,13 @@ class WallPost:
             return found
         last: dict[str, tuple[int, int]] = {}
         for header in (one.header for one in found):
-            number = header.incarnation, header.sequence
-            last[header.sender] = max(last.get(header.sender, number), number)
+            last[header.sender] = max(last.get(header.sender, header.newness), header.newness)
         for received in early:
             header = received.header
             ahead_ms = header.sent_ms - now_ms
             if ahead_ms <= AHEAD_MS:
                 continue
-            is_true = header.sender not in last or (header.incarnation, header.sequence) > last[header.sender]
+            is_true = header.sender not in last or header.newness > last[header.sender]
             if is_true and ahead_ms <= AHEAD_MS + APART_S * 1000 * factor:
                 self._early.append(received)
             else:

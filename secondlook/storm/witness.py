@@ -234,11 +234,11 @@ class CoordinatorWitness:
         vehicle = received.vehicle
         before = self._answers.get((vehicle, status.strip), _NONE_YET)
         if vehicle in self._states:
-            before = max(before, order_of(self._states[vehicle][0]))
-        if order_of(received.header) <= before:
+            before = max(before, self._states[vehicle][0].newness)
+        if received.header.newness <= before:
             self.noted.add(LATE_ANSWER)
             return
-        self._answers[vehicle, status.strip] = order_of(received.header)
+        self._answers[vehicle, status.strip] = received.header.newness
         record = self.node.ledger.get(status.strip)
         is_kept = record is not None and record.state is StripState.OFFERED and record.vehicle == vehicle
         if is_kept and status.state in (TaskState.ACCEPTED, TaskState.UNDER_WAY):
@@ -247,7 +247,7 @@ class CoordinatorWitness:
 
     def _hear_state(self, received: Received, state: AgentState, now_ms: int) -> None:
         before, vehicle = self._states.get(received.vehicle), received.vehicle
-        if before is None or order_of(received.header) > order_of(before[0]):
+        if before is None or received.header.newness > before[0].newness:
             self._states[vehicle] = received.header, state
             start = received.header.incarnation
             is_told = before is not None and (before[0].incarnation, where(before[1])) == (start, where(state))
@@ -379,10 +379,10 @@ class AgentWitness:
         if header.sent_ms < self.started_ms:
             self.noted.add(TASK_OF_BEFORE)
             return
-        if order_of(header) <= self._task_order:
+        if header.newness <= self._task_order:
             self.noted.add(LATE_TASK)
             return
-        self._task_order = order_of(header)
+        self._task_order = header.newness
         kinds = {type(one.message) for one in step.publish}
         is_silent = CoverageTile not in kinds and self.node.coverage is not None and self.node.coverage.told()
         if task.action is TaskAction.TELL_AGAIN and is_silent:
@@ -395,11 +395,6 @@ class AgentWitness:
             if works_on == task.strip or answers.isdisjoint(said):
                 what = f"it was told to give strip {task.strip} back, and has not"
                 self.tell(Violation("who is told to give back does", now_ms / 1000, self.node_id, what))
-
-
-def order_of(header: Header) -> tuple[int, int]:
-    """Which of two messages of one sender is the newer."""
-    return header.incarnation, header.sequence
 
 
 def _at(heard_ms: int | None) -> str:
