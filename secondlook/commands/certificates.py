@@ -14,6 +14,7 @@ from typing import Annotated
 
 import typer
 
+from secondlook.commands.given import Set
 from secondlook.errors import UserError
 from secondlook.fleet.build import build_fleet
 from secondlook.fleet.nodes import certified_when_spread
@@ -39,9 +40,7 @@ def certificates(
     add: Annotated[
         bool, typer.Option("--add", help="By the authority that is in the folder, for nodes that have none there yet.")
     ] = False,
-    set_: Annotated[
-        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Override a key of the scenario.")
-    ] = None,
+    set_: Set = None,
 ) -> None:
     """Make the certificates of a fleet spread over hosts: an authority, and by it one for each node, with its key.
 

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from secondlook.commands.given import Set
 from secondlook.commands.planned_survey import planned_surveys, unreachable
 from secondlook.commands.run import expected_of, refuse, tell_expected
 from secondlook.commands.scenarios import names_beginning_with
@@ -21,9 +22,7 @@ def check(
         str,
         typer.Argument(help="A bundled scenario's name or a YAML file.", autocompletion=names_beginning_with),
     ],
-    set_: Annotated[
-        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Override a key of the scenario.")
-    ] = None,
+    set_: Set = None,
     no_trial: Annotated[bool, typer.Option("--no-trial", help="Do not fly a goal.")] = False,
 ) -> None:
     """Validate a scenario. Tells all that is wrong with it by line, or how its area will be surveyed, what the mission

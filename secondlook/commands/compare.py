@@ -13,6 +13,7 @@ import typer
 from rich.console import Console
 
 from comms.said.announcement import LARGEST_SEED
+from secondlook.commands.given import AsJson, Set
 from secondlook.commands.many_missions import Dask, Jobs, Tell, engine, fly_watched
 from secondlook.commands.remarks import remark_on
 from secondlook.compare.flights import Flown, contenders, fly_all
@@ -46,13 +47,11 @@ def compare(
     ] = 1,
     jobs: Jobs = None,
     dask: Dask = None,
-    set_: Annotated[
-        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Override a key of the scenario.")
-    ] = None,
+    set_: Set = None,
     out: Annotated[
         Path | None, typer.Option(help="Folder for compare.json and the plot risk.png, new or empty.")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON alone.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Fly the same seeds with several allocators, and compare what they leave."""
     refuse_seed(set_ or (), "--first-seed and --seeds")

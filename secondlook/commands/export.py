@@ -11,6 +11,7 @@ from typing import Annotated
 
 import typer
 
+from secondlook.commands.given import Run
 from secondlook.commands.reading import GEOJSON, reading
 from secondlook.errors import UserError
 from secondlook.export.kml import to_kml
@@ -21,7 +22,6 @@ from secondlook.recorded import GeographicOrigin, RecordedMission, load_run, to_
 from secondlook.recorded.geojson import collection, features_of
 from secondlook.scenario import Scenario
 
-Run = Annotated[Path, typer.Argument(help="The folder of a run.")]
 Origin = Annotated[
     tuple[float, float] | None,
     typer.Option(metavar="LAT LON", help="Where x 0, y 0 is, degrees WGS84; the scenario's origin if left out."),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -14,6 +13,7 @@ from shapely.geometry.base import BaseGeometry
 from planner.clearance import MinesLeft
 from planner.goal import Lane
 from planner.types import Point
+from secondlook.commands.given import Run
 from secondlook.commands.reading import reading
 from secondlook.errors import UserError
 from secondlook.recorded import RecordedMission, load_run
@@ -38,7 +38,7 @@ DEGREES = _Units("LAT,LON in degrees", (90.0, 180.0), "54.401,10.201 54.403,10.2
 
 
 def mines(
-    run: Annotated[Path, typer.Argument(help="The folder of a run.")],
+    run: Run,
     lane: Annotated[
         str | None,
         typer.Option(metavar="X,Y X,Y ...", help="Points of a lane's middle, in order: metres of the mission frame."),

@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from secondlook.commands.given import AsJson
 from secondlook.commands.many_missions import Dask, Tell, engine, fly_watched
 from secondlook.errors import FAILED, UserError
 from secondlook.files import make_folder
@@ -27,7 +28,7 @@ NEEDED = {"sklearn": "scikit-learn", "matplotlib": "matplotlib"}
 
 def paper(
     out: Annotated[Path | None, typer.Option(help="Folder for the figures, as PNG; none are drawn without.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON alone.")] = False,
+    as_json: AsJson = False,
     seeds: Annotated[int, typer.Option(min=1, max=1000, help="Runs of the six missions, to tell the spread.")] = 1,
     dask: Dask = None,
 ) -> None:

@@ -8,12 +8,12 @@ from typing import Annotated
 
 import typer
 
+from secondlook.commands.given import Run
 from secondlook.commands.reading import PICTURE, reading
 from secondlook.errors import UserError
 from secondlook.progress import no_remark, shown_progress
 from secondlook.recorded import load_run
 
-Run = Annotated[Path, typer.Argument(help="The folder of a run.")]
 Out = Annotated[Path | None, typer.Option(help="The file to write; in the run's folder if left out.")]
 Width = Annotated[int, typer.Option(min=320, max=3840, help="Of the picture, in pixels; it is 9/16 as high.")]
 

@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from planner.spacing import TOLERANCE_M, adapt_range, track_offsets
+from secondlook.commands.given import AsJson, Set
 from secondlook.commands.planned_survey import plan_as_geojson, plan_as_json, plan_as_text, planned_surveys
 from secondlook.errors import UserError
 from secondlook.scenario import load_scenario
@@ -30,10 +31,8 @@ def plan(
         tuple[float, float] | None,
         typer.Option("--range", metavar="A B", help="Shortest and longest sensor range to plan with, metres."),
     ] = None,
-    set_: Annotated[
-        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Override a key of the scenario.")
-    ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON alone.")] = False,
+    set_: Set = None,
+    as_json: AsJson = False,
     as_geojson: Annotated[
         bool, typer.Option("--geojson", help="Print a scenario's area and tracks as GeoJSON alone.")
     ] = False,

@@ -15,6 +15,7 @@ from comms.said.codec import decode
 from comms.said.routing import Routing
 from comms.said.topics import RUN
 from comms.said.wire import WireError
+from secondlook.commands.given import Run
 from secondlook.errors import UserError
 from secondlook.fleet.build import build_fleet
 from secondlook.progress import no_remark, shown_progress
@@ -45,7 +46,7 @@ def _said_in_all(run: Path) -> int | None:
 
 
 def replay(
-    run: Annotated[Path, typer.Argument(help="The folder of a run.")],
+    run: Run,
     node: Annotated[str, typer.Option(help="Whom to replay: a vehicle's id, coordinator or world.")] = "coordinator",
     tolerance: Annotated[
         float, typer.Option(min=0, max=1, help="By how much numbers with a fraction may differ; 0: byte for byte.")

@@ -15,6 +15,7 @@ from typing import Annotated
 import typer
 
 from comms.said.announcement import LARGEST_SEED
+from secondlook.commands.given import Set
 from secondlook.commands.many_missions import Jobs, Tell, fly_watched
 from secondlook.engine.work_process import Lost, WorkProcess
 from secondlook.errors import FAILED, UserError
@@ -76,9 +77,7 @@ def storm(
         bool, typer.Option("--canaries", help="Plant bugs, and fly storms with each until it is found.")
     ] = False,
     jobs: Jobs = None,
-    set_: Annotated[
-        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Override a key of the scenario.")
-    ] = None,
+    set_: Set = None,
     out: Annotated[
         Path | None, typer.Option(help="Folder: of storms that fail their plan files, of a single one its files.")
     ] = None,

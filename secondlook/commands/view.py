@@ -12,6 +12,7 @@ from typing import Annotated
 
 import typer
 
+from secondlook.commands.given import Run
 from secondlook.errors import UserError
 from secondlook.files import check_run_folder
 from secondlook.progress import shown_progress
@@ -22,7 +23,7 @@ LONGEST_S = 10_000_000  # no mission is longer
 
 
 def view(
-    run: Annotated[Path, typer.Argument(help="The folder of a run.")],
+    run: Run,
     web: Annotated[bool, typer.Option("--web", help="In a browser on this machine, not in a window.")] = False,
     at: Annotated[
         float | None,
