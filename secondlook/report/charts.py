@@ -13,7 +13,7 @@ from comms.said.messages import AgentState, CoverageTile, Mode, Plan
 from planner.types import FloatArray
 from secondlook.recorded import Activity, RecordedMission, RiskMap
 from secondlook.recorded.metrics import Metrics
-from secondlook.report.drawing import Element, drawing, element, points, ticks
+from secondlook.report.drawing import PX_A_TICK, Element, drawing, element, grid, points, ticks, times
 from secondlook.report.words import Moment
 
 MOST_SAMPLES, FEWEST_SAMPLES = 240, 30
@@ -67,7 +67,7 @@ def _sample(metrics: Metrics, t_s: float) -> RiskSample:
 LEFT_PX, RIGHT_PX, BOTTOM_PX = 38.0, 12.0, 34.0
 MARK_PX = 9.0  # radius of a moment's number
 PLOT_PX = 240.0
-PX_A_TICK = 90.0
+QUARTERS = (0.0, 0.25, 0.5, 0.75, 1.0)
 SERIES: dict[str, Callable[[RiskSample], float]] = {
     "unseen": lambda sample: sample.unseen_share,
     "worst": lambda sample: sample.worst30_mean,
@@ -78,10 +78,10 @@ SERIES: dict[str, Callable[[RiskSample], float]] = {
 def risk_chart(samples: Sequence[RiskSample], moments: Sequence[Moment], width_px: float) -> Element:
     """`samples` from the start to the end; the moments are marked with their numbers, from 1."""
     end_s = max(samples[-1].t_s, 1e-3)
-    plot_px = width_px - LEFT_PX - RIGHT_PX
+    right = width_px - RIGHT_PX
 
     def x(t_s: float) -> float:
-        return LEFT_PX + plot_px * t_s / end_s
+        return LEFT_PX + (right - LEFT_PX) * t_s / end_s
 
     marks = _marks([x(moment.t_s) for moment in moments])
     top = 2 * MARK_PX * (1 + max((row for _, row in marks), default=0)) + 8
@@ -91,7 +91,8 @@ def risk_chart(samples: Sequence[RiskSample], moments: Sequence[Moment], width_p
         return bottom - PLOT_PX * share
 
     children = [
-        *_grid(x, y, ticks(end_s, int(plot_px / PX_A_TICK)), width_px),
+        *grid(y, ((share, f"{share:g}") for share in QUARTERS), LEFT_PX, right),
+        *times(end_s, LEFT_PX, right, bottom),
         *(
             _moment(moment, number, mark, bottom)
             for number, (moment, mark) in enumerate(zip(moments, marks, strict=True), 1)
@@ -102,16 +103,6 @@ def risk_chart(samples: Sequence[RiskSample], moments: Sequence[Moment], width_p
         ),
     ]
     return drawing(width_px, bottom + BOTTOM_PX, "Residual risk over time", children, class_="chart")
-
-
-def _grid(
-    x: Callable[[float], float], y: Callable[[float], float], times_s: list[float], width_px: float
-) -> Iterator[Element]:
-    for share in (0.0, 0.25, 0.5, 0.75, 1.0):
-        yield element("path", d=f"M{LEFT_PX},{y(share):.1f}H{width_px - RIGHT_PX:.1f}", class_="grid")
-        yield element("text", f"{share:g}", x=LEFT_PX - 6, y=y(share) + 4, class_="y")
-    for t_s in times_s:
-        yield element("text", f"{t_s:g} s", x=x(t_s), y=y(0) + 18, class_="x")
 
 
 def _marks(places: list[float]) -> list[tuple[float, int]]:
@@ -182,7 +173,7 @@ def histogram(before: RiskMap, after: RiskMap | None, width_px: float) -> Elemen
     children += [
         *(
             element("text", f"{share:g}", x=BARS_LEFT_PX + plot_px * share, y=bottom + 16, class_="x")
-            for share in (0.0, 0.25, 0.5, 0.75, 1.0)
+            for share in QUARTERS
         ),
         element("text", "residual risk", x=BARS_LEFT_PX + plot_px / 2, y=bottom + 34, class_="x"),
     ]

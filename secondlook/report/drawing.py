@@ -6,7 +6,7 @@ import base64
 import math
 import struct
 import zlib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
 from xml.etree import ElementTree
 
 import numpy as np
@@ -17,6 +17,7 @@ from secondlook.recorded import RiskMap
 
 Element = ElementTree.Element
 Value = str | float
+PX_A_TICK = 90.0
 
 
 def element(tag: str, *children: Element | str, **attributes: Value) -> Element:
@@ -64,6 +65,21 @@ def ticks(highest: float, about: int) -> list[float]:
     """From 0 to at most `highest` (> 0), about so many, at 1, 2 or 5 times a power of ten."""
     step = round_step(highest / max(1, about))
     return [index * step for index in range(math.floor(highest / step + 1e-9) + 1)]
+
+
+def grid(
+    y: Callable[[float], float], marks: Iterable[tuple[float, str]], left: float, right: float
+) -> Iterator[Element]:
+    """A line at each of some values, from left to right, and what it is called before it."""
+    for value, told in marks:
+        yield element("path", d=f"M{left},{y(value):.1f}H{right:.1f}", class_="grid")
+        yield element("text", told, x=left - 6, y=y(value) + 4, class_="y")
+
+
+def times(end_s: float, left: float, right: float, bottom: float) -> Iterator[Element]:
+    """Below a chart that goes from 0 to `end_s` (> 0), from left to right, its times."""
+    for t_s in ticks(end_s, int((right - left) / PX_A_TICK)):
+        yield element("text", f"{t_s:g} s", x=left + (right - left) * t_s / end_s, y=bottom + 18, class_="x")
 
 
 def indexed_png(pixels: NDArray[np.uint8], palette: NDArray[np.uint8]) -> bytes:

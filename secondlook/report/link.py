@@ -12,7 +12,7 @@ from secondlook.fleet.link import modem_configs
 from secondlook.recorded import RecordedMission
 from secondlook.recorded.link_figures import Age
 from secondlook.recorded.link_trace import ABOUT, ACKNOWLEDGEMENTS, IN_WORDS, LinkTrace, Span, Word
-from secondlook.report.drawing import Element, drawing, element, points, ticks
+from secondlook.report.drawing import Element, drawing, element, grid, points, ticks, times
 from secondlook.scenario import make_scenario
 
 MOST_BARS, SHORTEST_BAR_MS = 60, 20_000
@@ -154,7 +154,6 @@ def _subjects(trace: LinkTrace) -> list[SubjectFigures]:
 
 LEFT_PX, RIGHT_PX, TOP_PX, BOTTOM_PX, PLOT_PX = 52.0, 12.0, 10.0, 26.0, 170.0
 NAME_PX, LANE_PX, LOW_LANE_PX, MANY_LANES = 24.0, 60.0, 28.0, 6
-PX_A_TICK = 90.0
 
 
 def age_chart(trace: LinkTrace, end_s: float, width_px: float, classes: Mapping[str, str]) -> Element:
@@ -180,7 +179,7 @@ def age_chart(trace: LinkTrace, end_s: float, width_px: float, classes: Mapping[
             )
         )
     height = lane_px * len(lines)
-    children += _times(end_s, width_px, height)
+    children += times(end_s, LEFT_PX, width_px - RIGHT_PX, height)
     return drawing(
         width_px, height + BOTTOM_PX, "Age of what the coordinator knows of each vehicle", children, class_="chart"
     )
@@ -206,7 +205,7 @@ def sent_chart(trace: LinkTrace, bars: Sequence[Span], width_px: float) -> Eleme
     x, y = _axes(end_s, highest, width_px, lowest, top=TOP_PX, height=PLOT_PX)
     marks = ticks(highest, 3)
     marks += [-one for one in ticks(lowest, max(1, round(4 * lowest / highest)))[1:]]
-    children = [*_grid(y, marks, width_px, "{:g} B/s"), *_times(end_s, width_px, TOP_PX + PLOT_PX)]
+    children = [*_grid(y, marks, width_px, "{:g} B/s"), *times(end_s, LEFT_PX, width_px - RIGHT_PX, TOP_PX + PLOT_PX)]
     for one, size, gone in zip(bars, sent, lost, strict=True):
         used = min(size, one.used_bits / 8 / one.seconds)
         left, width = x(one.from_ms / 1000) + 0.5, x(one.until_ms / 1000) - x(one.from_ms / 1000) - 1
@@ -242,13 +241,5 @@ def _axes(
 
 def _grid(y: Callable[[float], float], values: Sequence[float], width_px: float, words: str) -> Iterator[Element]:
     """Lines at some values; `words`: how the highest is told, with its unit."""
-    for value in values:
-        told = words.format(value) if value == max(values) else f"{abs(value):g}"
-        yield element("path", d=f"M{LEFT_PX},{y(value):.1f}H{width_px - RIGHT_PX:.1f}", class_="grid")
-        yield element("text", told, x=LEFT_PX - 6, y=y(value) + 4, class_="y")
-
-
-def _times(end_s: float, width_px: float, bottom: float) -> Iterator[Element]:
-    plot_px = width_px - LEFT_PX - RIGHT_PX
-    for t_s in ticks(end_s, int(plot_px / PX_A_TICK)):
-        yield element("text", f"{t_s:g} s", x=LEFT_PX + plot_px * t_s / end_s, y=bottom + 18, class_="x")
+    told = (words.format(value) if value == max(values) else f"{abs(value):g}" for value in values)
+    return grid(y, zip(values, told, strict=True), LEFT_PX, width_px - RIGHT_PX)
