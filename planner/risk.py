@@ -18,6 +18,7 @@ from planner.types import EVERYWHERE, BoolArray, FloatArray, GridSpec, Window
 NATS_PER_LEVEL = 0.02
 MOST_LEVELS = 255
 HIGHEST_P_DETECT = 0.999
+"""The wire refuses P_d above this."""
 BLOCK = 64  # cells a side, in which the part that was looked at grows
 
 LevelArray = NDArray[np.uint8]

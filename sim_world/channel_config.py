@@ -12,7 +12,7 @@ from functools import cached_property
 from itertools import pairwise
 from typing import Literal
 
-from comms.said.messages import MOST_FRAMES
+from comms.said.messages import FARTHEST_M, MOST_FRAMES
 from comms.said.wire import LONGEST_FRAME
 from planner.types import Point
 from sim_world.acoustics import (
@@ -26,7 +26,6 @@ from sim_world.acoustics import (
     transmission_loss_db,
 )
 
-FARTHEST_M = 1e6
 ROUNDING_MS = 1e-6
 """A duration is not rounded up to the next millisecond for as little as this."""
 

@@ -14,19 +14,19 @@ from typing import Literal
 
 import numpy as np
 
+from comms.said.messages import FARTHEST_M
 from comms.said.wire import IDENTIFIER
 from planner.contacts import OTHERS_UP_TO
 from planner.currents import FlowGrid
 from planner.keep_out import NOWHERE, KeepOut
+from planner.risk import HIGHEST_P_DETECT
 from planner.types import DetectionCurve, Point, SonarShape
 from sim_world.channel_config import ChannelConfig
 from sim_world.footprints import FOOTPRINTS
 from sim_world.kinds import ALIKE, MIXTURES
 from sim_world.layouts import Given, Layout, Uniform
-from sim_world.sonar import HIGHEST_P_DETECT, CheckedSonar, CurveSonar, Seabed, SonarModel, SufferedSeabed
+from sim_world.sonar import CheckedSonar, CurveSonar, Seabed, SonarModel, SufferedSeabed
 
-FARTHEST_M = 1e6
-"""No position, run-in or turn radius of the world is larger; what follows from them then fits the wire's metres."""
 FARTHEST_RANGE_M = 1e4
 LARGEST_LOOK_CELLS = 65_536
 LARGEST_LOOK_TARGETS = 1_000

@@ -8,9 +8,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from planner.risk import HIGHEST_P_DETECT
 from planner.types import FloatArray
 from sim_world.config import SensorConfig
-from sim_world.sonar import HIGHEST_P_DETECT
 
 LOWEST_SEEN = 1e-4
 """The wire's step: an estimate of what was seen does not fall below it, for 0 says that nothing was seen."""

@@ -10,8 +10,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from planner.risk import HIGHEST_P_DETECT
 from planner.types import FloatArray
-from sim_world.sonar import HIGHEST_P_DETECT
 
 SIZES = (0.8, 1.2)
 """Assumed: a target is so many times as large as its kind tells, at least and at most, in all directions alike."""

@@ -7,10 +7,9 @@ from typing import Protocol
 
 import numpy as np
 
+from planner.risk import HIGHEST_P_DETECT
 from planner.types import DetectionCurve, FloatArray
 
-HIGHEST_P_DETECT = 0.999
-"""The wire refuses P_d above this."""
 Position = tuple[FloatArray, FloatArray]
 """x and y, mission frame."""
 

@@ -8,12 +8,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from comms.node import random_stream
-from comms.said.messages import Maneuver, ManeuverKind, ManeuverState, ManeuverStatus, Nav, TruthPose
+from comms.said.messages import FARTHEST_M, Maneuver, ManeuverKind, ManeuverState, ManeuverStatus, Nav, TruthPose
 from planner.dubins import Pose
 from planner.keep_out import NOWHERE, KeepOut
 from planner.types import Point
 from planner.way_home import THERE_M
-from sim_world.config import FARTHEST_M, VehicleConfig
+from sim_world.config import VehicleConfig
 from sim_world.motion import OFF_M, FollowedTrack, Motion, NoWayError, bearing_rad
 from sim_world.steadiness import STILL_WATER, Stream
 

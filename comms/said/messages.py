@@ -57,7 +57,7 @@ from planner.types import DetectionCurve, LookGeometry, Strip
 MOST_TRACKS = 2000
 """Of one vehicle's plan."""
 FARTHEST_M = 1e6
-"""A look or a vehicle farther away is none: what follows from it would not fit the wire's metres."""
+"""No place, look or length is farther or longer: what follows from it would not fit the wire's metres."""
 FARTHEST_RANGE_M = 1e4
 """Of a look, to a side."""
 

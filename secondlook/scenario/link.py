@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 from pydantic import BeforeValidator, Field, ValidationError, ValidationInfo, field_validator, model_validator
 
 from comms.errors import NO_FAILURES, in_words
-from comms.said.messages import MOST_FRAMES
+from comms.said.messages import FARTHEST_M, MOST_FRAMES
 from comms.said.wire import LONGEST_FRAME
 from secondlook.scenario import bundled
 from secondlook.scenario.errors import allowed, dotted, shown
@@ -18,7 +18,6 @@ IDEAL = "ideal"
 """The profile of a fleet in which everybody hears everybody, at once."""
 SHIP = "ship"
 """The platform of a coordinator that is aboard no vehicle."""
-FARTHEST_M = 1e6
 
 Range = Annotated[float, Field(ge=0, le=FARTHEST_M)]
 Reach = Annotated[float, Field(ge=1, le=FARTHEST_M)]

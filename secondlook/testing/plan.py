@@ -7,10 +7,10 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field, ValidationInfo, field_validator
 
+from comms.said.messages import FARTHEST_M
 from secondlook.errors import UserError
 from secondlook.fleet.nodes import COORDINATOR
 from secondlook.scenario import Scenario
-from secondlook.scenario.link import FARTHEST_M
 from secondlook.scenario.load import load_model
 from secondlook.scenario.text import Value, dump
 from secondlook.scenario.values import Mapping, Share, refused

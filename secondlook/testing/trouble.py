@@ -12,10 +12,11 @@ from numbers import Real
 from comms.lockstep.events import Freeze, Join, Kill, NodeEvent, absent_at_start, timeline
 from comms.lockstep.faults import STRUCK, CutOff, FaultKind, Faults, MessageFault
 from comms.said.announcement import Role
+from comms.said.messages import FARTHEST_M
 from comms.said.routing import Routing
 from secondlook.errors import UserError
 from secondlook.recorded.mission import chosen_keys
-from sim_world.channel_config import FARTHEST_M, Outage
+from sim_world.channel_config import Outage
 
 LARGEST_FAULT_SEED = 2**63 - 1
 

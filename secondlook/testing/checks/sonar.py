@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from hypothesis import strategies as st
 
+from planner.risk import HIGHEST_P_DETECT
 from planner.types import DetectionCurve, SonarShape
 from secondlook.scenario.plug_ins import CURVE, SONAR
 from secondlook.testing.checks.examples import EXAMPLES, PATIENCE_S, Checked
 from sim_world.config import SeabedConfig, SensorConfig
 from sim_world.footprints import FOOTPRINTS
 from sim_world.seabed import make_seabed
-from sim_world.sonar import HIGHEST_P_DETECT
 
 
 def check_detection_curve(curve: Any, *, patience_s: float = PATIENCE_S) -> None:

@@ -8,14 +8,13 @@ from typing import Any
 import numpy as np
 from hypothesis import strategies as st
 
+from comms.said.messages import FARTHEST_M, MOST_TRACKS
 from planner.profile_spacing import PartSoFar, ProfilePlanner, SpacingTerms
 from planner.spacing_planners import LENGTH_TOLERANCE_M, FlownTrack, counted_range_m, lowest_range_m
 from planner.types import DetectionCurve
 from secondlook.scenario.plug_ins import SPACING
 from secondlook.testing.checks.examples import EXAMPLES, PATIENCE_S, Checked, is_number, is_whole
 
-_FARTHEST_M = 1e6
-_MOST_TRACKS = 2000  # what a plan may hold
 _LONGEST_NOTE = 100  # characters
 _PAIR = 2
 _MOST_IN_VAIN = 10  # decisions that cover nothing more
@@ -85,7 +84,7 @@ def _survey_by_profile(checked: Checked, given: dict[str, float], width_m: float
     veteran, terms, flown = checked.make(**given), SpacingTerms(_CELL_M), list[FlownTrack]()
     planned_m: tuple[float, ...] = ()
     curve, known_m = _curve(given, r_eff_m[0]), r_eff_m[0]
-    while len(flown) <= _MOST_TRACKS:
+    while len(flown) <= MOST_TRACKS:
         part = PartSoFar(width_m, None, tuple(flown), planned_m, curve, known_m)
         told = f"{checked.name}, lay, after {len(flown)} tracks over {width_m:g} m,"
         decision = _read_laid(checked.ask(veteran, "lay", part, terms), told)
@@ -101,7 +100,7 @@ def _survey_by_profile(checked: Checked, given: dict[str, float], width_m: float
             curve = _curve(given, known_m)
             flown.append(FlownTrack(across_m, max(known_m, range_m) if singles else known_m, singles, curve))
         planned_m = offsets_m[asks_after:]
-    raise AssertionError(f"{checked.name}, lay: the survey never ends: {width_m:g} m, and {_MOST_TRACKS} tracks flown")
+    raise AssertionError(f"{checked.name}, lay: the survey never ends: {width_m:g} m, and {MOST_TRACKS} tracks flown")
 
 
 def _curve(given: dict[str, float], r_eff_m: int) -> DetectionCurve:
@@ -141,14 +140,14 @@ def _read(decision: Any, told: str) -> _Decision:
         replans, note = decision.replans, decision.note
     except (AttributeError, TypeError) as error:
         raise AssertionError(f"{told} must answer as planner.spacing_planners.SpacingDecision; {error}") from error
-    if not is_whole(range_m) or not 1 <= range_m <= _FARTHEST_M:
+    if not is_whole(range_m) or not 1 <= range_m <= FARTHEST_M:
         raise AssertionError(f"{told} plans with a range of {range_m!r} m, which is not some whole metres")
     if not offsets_m:
         raise AssertionError(f"{told} lays no track, though not all is covered")
-    if len(offsets_m) > _MOST_TRACKS:
-        raise AssertionError(f"{told} lays {len(offsets_m)} tracks; at most {_MOST_TRACKS} fit a plan")
+    if len(offsets_m) > MOST_TRACKS:
+        raise AssertionError(f"{told} lays {len(offsets_m)} tracks; at most {MOST_TRACKS} fit a plan")
     for offset_m in offsets_m:
-        if not is_number(offset_m) or abs(offset_m) > _FARTHEST_M:
+        if not is_number(offset_m) or abs(offset_m) > FARTHEST_M:
             raise AssertionError(f"{told} lays a track at {offset_m!r} m, which is no place")
     if not isinstance(replans, bool):
         raise AssertionError(f"{told} must say with True or False whether to ask again, not with {replans!r}")
