@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-import re
 import struct
 import subprocess
 import tempfile
 from collections.abc import Iterable
 from pathlib import Path
-from types import TracebackType
 
 from viz.viewer_program import (
     BIND,
     PROGRAM,
+    RunningViewer,
     ViewerError,
-    guard,
     quiet_environment,
     server_url,
-    start,
-    wait_for,
-    wait_for_end,
+    wait_until_drawn,
     web_address,
 )
 from viz.web_page import WebPage
@@ -73,13 +69,11 @@ def repair(recording: Path, repaired: Path) -> None:
         raise ViewerError(f"{recording}: cannot be repaired: {said[-1] if said else 'the viewer does not say why'}")
 
 
-DRAWS = re.compile(r"wgpu adapter")
 WINDOW = ("--hide-welcome-screen",)
-WINDOW_WITHIN_S = 8.0  # a window that is still there then is taken for open, even if it has not said so
 WEB = ("--serve-web", "--web-viewer-port", "0", "--server-memory-limit", "75%")
 
 
-class RecordingViewer:
+class RecordingViewer(RunningViewer):
     """Use as a context, which the viewer does not outlive, even if this process is killed. It listens on this machine
     only, on ports that the system picks.
 
@@ -91,32 +85,17 @@ class RecordingViewer:
         folder = Path(tempfile.mkdtemp(prefix="secondlook-view-"))
         self.log = folder / "viewer.txt"
         command = [PROGRAM, *(str(one.resolve()) for one in recordings), *(WEB if web else WINDOW), *BIND]
-        self.process = start(command, self.log, subprocess.DEVNULL)
-        self._guard = guard(self.process, folder)
-        self._page: WebPage | None = None
+        super().__init__(command, self.log, subprocess.DEVNULL, folder)
         try:
             if web:
                 self._page = WebPage(web_address(self.process, self.log), server_url(self.process, self.log))
             else:
-                wait_for(DRAWS, self.process, self.log, WINDOW_WITHIN_S)
+                wait_until_drawn(self.process, self.log)
                 if at_s is not None:
                     self._go_to(at_s)
         except BaseException:
             self.close()
             raise
-
-    def __enter__(self) -> RecordingViewer:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
-    @property
-    def page(self) -> str:
-        """The address for a browser; "" without `web`."""
-        return self._page.address if self._page else ""
 
     def _go_to(self, time_s: float) -> None:
         # Imported when it is asked for: it takes half a second, which every command would.
@@ -128,14 +107,3 @@ class RecordingViewer:
             go_to(ViewerClient.connect(server_url(self.process, self.log)), time_s)
         except (PictureError, ConnectionError) as error:
             raise ViewerError(f"the viewer does not go to {time_s:g} s: {error}") from error
-
-    def wait(self) -> None:
-        """Waits until the window is closed, or what interrupts this process."""
-        wait_for_end(self.process)
-
-    def close(self) -> None:
-        """Ends the viewer."""
-        if self._page is not None:
-            self._page.close()
-        self._guard.communicate(b"")
-        self.process.wait()

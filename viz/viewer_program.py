@@ -1,4 +1,4 @@
-"""The viewer's own program, the way it is started here: quiet, and where it says that it listens."""
+"""The viewer's own program, the way it is started here, and until when: quiet, and where it says that it listens."""
 
 from __future__ import annotations
 
@@ -9,8 +9,12 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import TracebackType
+from typing import Self
 
 import rerun_cli  # type: ignore[import-untyped]
+
+from viz.web_page import WebPage
 
 # The wheel's command is a wrapper that leaves the viewer behind when it is killed: start the viewer itself.
 PROGRAM = str(Path(rerun_cli.__file__).with_name("rerun"))
@@ -21,6 +25,8 @@ WEB_PAGE = re.compile(r"Hosting a web-viewer at (http://127\.0\.0\.1:\d+)")
 READY_WITHIN_S = 20.0
 POLL_S = 0.05
 NOTICED_WITHIN_S = 1.0  # a signal that comes just as a wait begins
+DRAWS = re.compile(r"wgpu adapter")
+WINDOW_WITHIN_S = 8.0  # a window that is still there then is taken for open, even if it has not said so
 
 # It outlives this process if it must, and needs no Python for it.
 # Standard input closes when this process ends, however it ends.
@@ -29,6 +35,49 @@ GUARD = 'read -r word; [ "$word" = keep ] || kill -9 "$1"; rm -rf "$2"'
 
 class ViewerError(RuntimeError):
     """Nothing can be shown; the text says why and what helps, in one sentence."""
+
+
+class RunningViewer:
+    """The program, run until the end of a context, or of this process, even if that is killed. `folder`: where its
+    files are, which goes with it."""
+
+    def __init__(self, command: list[str], log: Path, stdin: int, folder: Path) -> None:
+        self.process = start(command, log, stdin)
+        self._guard = guard(self.process, folder)
+        self._page: WebPage | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    @property
+    def page(self) -> str:
+        """The address for a browser; "" without one."""
+        return self._page.address if self._page else ""
+
+    def wait(self) -> None:
+        """Waits until it has ended, by itself or by what interrupts this process."""
+        # A wait without a timeout would take no notice of a signal that comes just as it begins.
+        while True:
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self.process.wait(timeout=NOTICED_WITHIN_S)
+                return
+
+    def close(self) -> None:
+        """Ends it."""
+        self._end()
+
+    def _end(self, *, stays: bool = False) -> None:
+        if self._page is not None:
+            self._page.close()
+        with contextlib.suppress(BrokenPipeError):
+            self._guard.communicate(b"keep\n" if stays else b"")
+        if not stays:
+            self.process.wait()
 
 
 def check_display() -> None:
@@ -91,6 +140,11 @@ def wait_for(words: re.Pattern[str], process: subprocess.Popen[bytes], log: Path
     return None
 
 
+def wait_until_drawn(window: subprocess.Popen[bytes], log: Path) -> None:
+    """Waits until the program's window draws; raises ViewerError where it has ended instead."""
+    wait_for(DRAWS, window, log, WINDOW_WITHIN_S)
+
+
 def quiet_environment() -> dict[str, str]:
     """This process's environment, changed so that the viewer sends no usage statistics and looks for no update."""
     # CI is the viewer's switch for usage statistics that needs no file in anyone's home.
@@ -98,15 +152,6 @@ def quiet_environment() -> dict[str, str]:
     environment.pop("RUST_LOG", None)  # it would hide what the viewer says of its ports
     # The viewer would ask a host outside for a newer version of itself: a proxy that is not there keeps it from that.
     return environment | dict.fromkeys(("HTTPS_PROXY", "https_proxy"), "http://127.0.0.1:1")
-
-
-def wait_for_end(process: subprocess.Popen[bytes]) -> None:
-    """Waits until a program has ended, by itself or by what interrupts this process."""
-    # A wait without a timeout would take no notice of a signal that comes just as it begins.
-    while True:
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            process.wait(timeout=NOTICED_WITHIN_S)
-            return
 
 
 def _said(words: re.Pattern[str], server: subprocess.Popen[bytes], log: Path) -> str:

@@ -66,7 +66,7 @@ def watched(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[LiveServer, int]]
                 viewer.kill()
             server.window.wait()
     # The server goes with its window.
-    wait_until(lambda: server.server.poll() is not None)
+    wait_until(lambda: server.process.poll() is not None)
 
 
 def client_of(server: LiveServer) -> ViewerClient:
@@ -144,8 +144,8 @@ def test_a_server_that_stalls_or_dies_holds_nothing_up(
     messages: list[Received], recording: Path, tmp_path: Path, harm: signal.Signals, caplog: pytest.LogCaptureFixture
 ) -> None:
     with LiveServer(RUN, web=False) as server:
-        path = record_all(server.pipe, tmp_path, messages, lambda: os.kill(server.server.pid, harm))
-        assert is_gone(server.server.pid) == (harm == signal.SIGKILL)
+        path = record_all(server.pipe, tmp_path, messages, lambda: os.kill(server.process.pid, harm))
+        assert is_gone(server.process.pid) == (harm == signal.SIGKILL)
     assert_complete(path, recording)
     assert len(caplog.messages) == 1
     assert caplog.messages[0].startswith("the live view ")
@@ -197,12 +197,12 @@ def test_the_pipe_stays_open_as_long_as_the_window(monkeypatch: pytest.MonkeyPat
         reader = os.open(server.pipe, os.O_RDONLY | os.O_NONBLOCK)
     ends = select.poll()
     ends.register(reader, select.POLLHUP)
-    open_afterwards, serves_afterwards = ends.poll(0) == [], server.server.poll() is None
+    open_afterwards, serves_afterwards = ends.poll(0) == [], server.process.poll() is None
     assert server.window is not None
     for viewer in psutil.Process(server.window.pid).children():
         viewer.kill()
     server.window.wait()
-    wait_until(lambda: server.server.poll() is not None)
+    wait_until(lambda: server.process.poll() is not None)
     closed_at_last = ends.poll(0) == [(reader, select.POLLHUP)]
     os.close(reader)
     assert (open_afterwards, serves_afterwards, closed_at_last) == (True, True, True)
@@ -274,7 +274,7 @@ def test_a_viewer_that_comes_late_gets_everything(
         os.killpg(server.window.pid, signal.SIGKILL)
         server.window.wait()
         server.window = None  # so that the server ends here
-    assert server.server.poll() is not None
+    assert server.process.poll() is not None
 
 
 def test_the_page_is_served_on_this_machine_alone() -> None:
@@ -284,11 +284,11 @@ def test_the_page_is_served_on_this_machine_alone() -> None:
             assert b"<html" in answer.read()
         listening = [
             one.laddr.ip
-            for one in psutil.Process(server.server.pid).net_connections("inet")
+            for one in psutil.Process(server.process.pid).net_connections("inet")
             if one.status == psutil.CONN_LISTEN
         ]
         assert listening == ["127.0.0.1"] * 2
-    assert server.server.poll() is not None
+    assert server.process.poll() is not None
     assert not server.pipe.parent.exists()
 
 
@@ -296,7 +296,7 @@ def test_the_server_does_not_outlive_a_killed_command() -> None:
     program = f"""
 from viz.live_server import LiveServer
 with LiveServer({RUN!r}, web=True) as server:
-    print(server.server.pid, server.pipe.parent, flush=True)
+    print(server.process.pid, server.pipe.parent, flush=True)
     server.wait()
 """
     with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True) as command:
@@ -312,5 +312,5 @@ def test_a_window_that_cannot_open_is_told_and_nothing_is_left(monkeypatch: pyte
     refused = pytest.raises(ViewerError, match=r"^the viewer does not start: ")
     with LiveServer(RUN, web=False) as server, refused:
         server.open_window()
-    assert server.server.poll() is not None
+    assert server.process.poll() is not None
     assert not server.pipe.parent.exists()
