@@ -7,15 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from stepped_world import SteppedWorld
 
-from comms.node import Publication, Received, Step
-from comms.said.codec import Header
-from comms.said.messages import Maneuver, ManeuverKind, Message, MissionOver, Nav, Packet
-from comms.said.topics import MANEUVER, MISSION_OVER, MODEM_RX, MODEM_TX, Topic
+from comms.said.messages import Maneuver, ManeuverKind, MissionOver, Nav, Packet
+from comms.said.topics import MANEUVER, MISSION_OVER, MODEM_RX, MODEM_TX
 from planner.types import DetectionCurve
 from sim_world.channel_config import ChannelConfig, LossTable, Signal
 from sim_world.config import SensorConfig, VehicleConfig, WorldConfig
-from sim_world.world import World
 
 AREA = ((0.0, 0.0), (3000.0, 0.0), (3000.0, 400.0), (0.0, 400.0))
 SENSOR = SensorConfig(DetectionCurve(np.array([0.0, 100.0]), np.array([0.5, 0.5])))
@@ -27,36 +25,11 @@ CHANNEL = ChannelConfig(SIGNAL, ("ship", "a", "b"), still=(("ship", (1500.0, 0.0
 LINKED = WorldConfig(seed=1, area=AREA, vehicles=(A, B), channel=CHANNEL)
 
 
-class Sea:
-    """Steps a world by its wake-ups, and tells it what was sent a millisecond ago, as lockstep does."""
-
-    def __init__(self, config: WorldConfig) -> None:
-        self.world = World(config)
-        self.now_ms = 0
-        self.published: list[tuple[int, Publication]] = []
-        self._take(self.world.start(0))
-
-    def until(self, time_ms: int) -> Sea:
-        while self.wake_ms is not None and self.wake_ms <= time_ms:
-            self.now_ms = self.wake_ms
-            self._take(self.world.on_wake(self.now_ms))
-        self.now_ms = time_ms
-        return self
-
-    def tell(self, topic: Topic, message: Message, vehicle: str = "") -> Sea:
-        header = Header("sender", 0, 0, max(0, self.now_ms - 1))
-        self._take(
-            self.world.on_message(Received(topic.key(vehicle=vehicle), topic, vehicle, header, message), self.now_ms)
-        )
-        return self
+class Sea(SteppedWorld):
+    """With vehicles and a ship that send."""
 
     def send(self, platform: str, *frames: bytes, at_ms: int) -> Sea:
         return self.until(at_ms + 1).tell(MODEM_TX, Packet(frames), platform)
-
-    def _take(self, step: Step) -> None:
-        assert step.wake_ms is None or step.wake_ms > self.now_ms
-        self.wake_ms = step.wake_ms
-        self.published += [(self.now_ms, one) for one in step.publish]
 
     @property
     def heard(self) -> list[tuple[int, str, tuple[bytes, ...]]]:

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from stepped_world import SteppedWorld
 
-from comms.node import Node, Publication, Received, Step
+from comms.node import Publication, Step
 from comms.said.announcement import Role
 from comms.said.codec import Header, encode
 from comms.said.messages import (
@@ -26,7 +27,7 @@ from comms.said.messages import (
     TruthTargets,
 )
 from comms.said.routing import RosterNode, Routing
-from comms.said.topics import LOOK, MANEUVER, MANEUVER_STATUS, MISSION_OVER, TRUTH_LOOK, TRUTH_POSE, Topic
+from comms.said.topics import LOOK, MANEUVER, MANEUVER_STATUS, MISSION_OVER, TRUTH_LOOK, TRUTH_POSE
 from planner.types import DetectionCurve
 from sim_world.config import (
     CurrentConfig,
@@ -37,7 +38,6 @@ from sim_world.config import (
     VehicleConfig,
     WorldConfig,
 )
-from sim_world.world import World
 
 AREA = ((0.0, 0.0), (1212.0, 0.0), (1212.0, 400.0), (0.0, 400.0))
 # The trial's sonar: it sees from about 25 m to 130.9 m, best at 70 m.
@@ -60,37 +60,11 @@ NOISY = WorldConfig(
 Published = list[tuple[int, Publication]]
 
 
-class Sea:
-    """Steps a world by its wake-ups, tells it orders at their times, and keeps what it publishes."""
-
-    def __init__(self, config: WorldConfig) -> None:
-        self.world: Node = World(config)
-        self.now_ms = 0
-        self.wake_ms: int | None = None
-        self.published: Published = []
-        self._take(self.world.start(0))
-
-    def until(self, time_ms: int) -> "Sea":
-        while self.wake_ms is not None and self.wake_ms <= time_ms:
-            self.now_ms = self.wake_ms
-            self._take(self.world.on_wake(self.now_ms))
-        self.now_ms = time_ms
-        return self
-
-    def tell(self, topic: Topic, message: Message, vehicle: str = "") -> "Sea":
-        header = Header("sender", 0, 0, max(0, self.now_ms - 1))
-        received = Received(topic.key(vehicle=vehicle), topic, vehicle, header, message)
-        self._take(self.world.on_message(received, self.now_ms))
-        return self
+class Sea(SteppedWorld):
+    """Whose vehicles are told orders."""
 
     def order(self, vehicle: str, order: Maneuver) -> "Sea":
         return self.tell(MANEUVER, order, vehicle)
-
-    def _take(self, step: Step) -> None:
-        # Stricter than the protocol asks: nothing is left due, also after a message.
-        assert step.wake_ms is None or step.wake_ms > self.now_ms
-        self.wake_ms = step.wake_ms
-        self.published += [(self.now_ms, one) for one in step.publish]
 
     def said(self, kind: type, vehicle: str = "a") -> list[tuple[int, Message]]:
         return [
@@ -297,7 +271,7 @@ def test_a_late_wake_up_loses_no_look_and_repeats_no_course() -> None:
     sea = Sea(QUIET).order("a", NORTH_400).until(55_000)
     said = len(sea.published)
     sea.now_ms = 85_400
-    sea._take(sea.world.on_wake(85_400))
+    sea.take(sea.world.on_wake(85_400))
     assert [type(one.message) for _, one in sea.published[said:]] == [Look, Look, Look, Nav]
     assert sea.wake_ms == 90_000
 

@@ -8,13 +8,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 
-from fleets import EACH_ALONE, ROSTER, RUN_INFO, Scripted, password
+from fleets import EACH_ALONE, ROSTER, RUN_INFO, filled, password
 
 from comms.errors import NodeError
 from comms.keys import HostSpec, RunKeys
 from comms.node import Listener, Node
 from comms.result import BusResult
-from comms.said.announcement import ClockMode, Role
+from comms.said.announcement import ClockMode
 from comms.said.routing import Routing
 from comms.session import open_client, open_hub
 from comms.wall.access import access_rules
@@ -27,12 +27,6 @@ FACTOR = 100.0
 WALL_RUN = replace(RUN_INFO, mode=ClockMode.WALL)
 WALL_KEYS = RunKeys("toy")
 ROUTING = Routing(ROSTER)
-
-
-def filled(nodes: Mapping[str, Node]) -> dict[str, Node]:
-    """The nodes, and silent ones for those left out."""
-    acting = [node.node_id for node in ROSTER if not node.listens_only and node.role is not Role.CLOCK]
-    return {node_id: nodes.get(node_id, Scripted()) for node_id in acting}
 
 
 def _itself(node: Node) -> Node:

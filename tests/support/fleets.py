@@ -155,9 +155,9 @@ def on_local(
 
     Whoever joins after it was killed is, as on every bus here, the node under its id with a dot and its incarnation.
     """
-    filled = _filled(nodes)
-    starts = {name: iter([filled[name], nodes.get(f"{name}.1", filled[name])]) for name in filled}
-    makers = {name: partial(next, starts[name]) for name in filled}
+    all_nodes = filled(nodes)
+    starts = {name: iter([all_nodes[name], nodes.get(f"{name}.1", all_nodes[name])]) for name in all_nodes}
+    makers = {name: partial(next, starts[name]) for name in all_nodes}
     watchers = {"observer": listener}
     return run_local(Routing(ROSTER), makers, watchers, RUN_INFO, time_limit_ms, faults=faults, events=events)
 
@@ -223,7 +223,7 @@ def over_zenoh(
     `before` is told the hub's endpoint before any host is started. `hub_options` go to `Hub`. When the hub fails,
     `on_failure` is called, and what is left of the fleet sent home, before its error goes on.
     """
-    filled = _filled(nodes)
+    all_nodes = filled(nodes)
     routing = Routing(ROSTER)
     users = {plan.host: password(plan.host) for plan in plans}
     hub_session, endpoint = open_hub(users, access_rules(routing, plans, KEYS) if rules else None)
@@ -236,7 +236,7 @@ def over_zenoh(
             if plan.host == "observer":
                 ListenerHost(session, KEYS, plan.host, "observer", listener, routing).run()
             else:
-                its_nodes = {name: nodes.get(plan.host, filled[name]) for name in plan.nodes}
+                its_nodes = {name: nodes.get(plan.host, all_nodes[name]) for name in plan.nodes}
                 NodeHost(session, KEYS, plan, its_nodes, routing, faults).run()
 
     threads = {
@@ -259,7 +259,7 @@ def over_zenoh(
 
     with hub_session:
         before(endpoint)
-        world = {"world": filled["world"]}
+        world = {"world": all_nodes["world"]}
         options = {"faults": faults, "carry_out": carry_out, **hub_options}
         hub = Hub(hub_session, KEYS, routing, plans, world, time_limit_ms, **options)
         for plan in plans:
@@ -280,7 +280,8 @@ def over_zenoh(
                     assert not thread.is_alive(), f"{thread.name} has not ended"
 
 
-def _filled(nodes: Mapping[str, Node]) -> dict[str, Node]:
+def filled(nodes: Mapping[str, Node]) -> dict[str, Node]:
+    """The nodes, and silent ones for those left out."""
     acting = [node.node_id for node in ROSTER if not node.listens_only and node.role is not Role.CLOCK]
     return {node_id: nodes.get(node_id, Scripted()) for node_id in acting}
 

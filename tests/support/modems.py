@@ -6,11 +6,12 @@ import heapq
 from collections.abc import Callable
 from typing import Any, Literal
 
-from fleets import ROSTER, with_modems
+from fleets import ROSTER, state, with_modems
 
 from comms.node import Received, Step
 from comms.runner import Intake, Stamp
 from comms.said.announcement import ClockMode, Grid, Role, RosterVehicle, RunInfo, Vertex
+from comms.said.codec import Header, body_of, packed
 from comms.said.messages import AgentState, Heard, Packet
 from comms.said.routing import Routing
 from comms.said.topics import HEARD, MODEM_RX, MODEM_TX, RUN
@@ -154,3 +155,14 @@ class Waters:
                 opened = self._intake.open(message.key, message.payload)
                 assert opened is not None
                 self.heard.append((self.now_ms, platform, opened))
+
+
+def said(sender: str, key: str, message: Any, at_ms: int) -> Received:
+    """What one of a fleet with modems says."""
+    return Stamp(sender, Routing(with_modems(ROSTER)))(key, message, at_ms).opened()
+
+
+def state_heard(sent_ms: int, at_ms: int) -> Received:
+    """What the ship's modem tells of a state of beta's."""
+    payload = packed(Header("beta", 0, 0, sent_ms), body_of(state()))
+    return said("modem-ship", "modem/ship/heard", Heard("agent/beta/state", payload), at_ms)

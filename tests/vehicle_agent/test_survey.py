@@ -24,8 +24,8 @@ from by_hand import (
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from one_node import OneNode, Said
+from survey_by_hand import SMALL, fly_all, on_its_way, survey
 
-from comms.said.announcement import Role, RunInfo
 from comms.said.messages import (
     AgentState,
     Contact,
@@ -45,51 +45,12 @@ from comms.said.messages import (
     TaskAction,
 )
 from planner.fleet_map import FleetMap
-from planner.footprints.side import SideLooking
 from planner.profile_spacing import ProfileSpacing
-from planner.spacing_planners import AdaptiveSpacing, FixedSpacing, SpacingPlanner
-from planner.types import BoolArray, DetectionCurve, GridSpec, Point, SonarShape
-from vehicle_agent.config import WHOLE, SurveyConfig
+from planner.spacing_planners import AdaptiveSpacing, FixedSpacing
+from planner.types import BoolArray, DetectionCurve, GridSpec, Point
 from vehicle_agent.survey import SurveyAgent
 
 SEES_TO_130_M = flat(0.3, 25, 130)
-SMALL = run_info(360, 200, cell_m=10)
-
-
-def survey(
-    spacing: SpacingPlanner | None = None,
-    *,
-    nadir_gap_m: float = 40,
-    range_m: float = 145,
-    hotspot_risk: float = 0.6,
-    prior: DetectionCurve | None = None,
-    share: tuple[float, float] = WHOLE,
-    begin: Point | None = None,
-) -> OneNode:
-    """A survey agent that waits for the run."""
-    config = SurveyConfig(
-        vehicle=PRIMARY,
-        spacing=spacing or AdaptiveSpacing(nadir_gap_m, range_m),
-        footprint=SideLooking(SonarShape("side", nadir_gap_m, range_m)),
-        nadir_gap_m=nadir_gap_m,
-        range_m=range_m,
-        threshold=0.05,
-        hotspot_risk=hotspot_risk,
-        run_in_m=20,
-        endurance_ms=36_000_000,
-        prior=prior,
-        share=share,
-        begin=begin,
-    )
-    return OneNode(SurveyAgent(config), Role.SURVEY)
-
-
-def on_its_way(agent: OneNode | None = None, run: RunInfo = SMALL) -> OneNode:
-    """The same, told of the run and of where its vehicle is."""
-    agent = agent or survey()
-    agent.hear("run", run, at_ms=1)
-    agent.hear(f"veh/{PRIMARY}/nav", nav())
-    return agent
 
 
 def command(agent: OneNode) -> Maneuver:
@@ -97,16 +58,6 @@ def command(agent: OneNode) -> Maneuver:
     maneuver = to_follow(agent)
     assert maneuver is not None
     return maneuver
-
-
-def fly_all(agent: OneNode, p_detect: P_Detect, *, most: int = 40) -> None:
-    """Flies every track that the agent asks for."""
-    for _ in range(most):
-        maneuver = to_follow(agent)
-        if maneuver is None:
-            return
-        fly(agent, PRIMARY, maneuver, p_detect)
-    raise AssertionError(f"the agent asks for more than {most} tracks")
 
 
 def offsets(plan: Plan) -> list[float]:

@@ -10,21 +10,19 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import shapely
-from by_hand import PRIMARY, P_Detect, flat, fly, look, nav, run_info, tell_status, to_follow
+from by_hand import PRIMARY, P_Detect, flat, fly, look, run_info, tell_status, to_follow
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from one_node import OneNode
 from regions import regions
+from survey_by_hand import fly_all, on_its_way, survey
 
-from comms.said.announcement import Grid, Hole, Role, RunInfo, Vertex, Zone
+from comms.said.announcement import Grid, Hole, RunInfo, Vertex, Zone
 from comms.said.messages import AgentState, Hotspot, HotspotState, ManeuverState, Mode, Plan, PlannedTrack
-from planner.footprints.footprint import Footprint
-from planner.footprints.side import SideLooking
 from planner.footprints.wedge import ForwardLooking
 from planner.region import Region
-from planner.spacing_planners import AdaptiveSpacing, FixedSpacing, SpacingDecision, SpacingPlanner
+from planner.spacing_planners import FixedSpacing, SpacingDecision
 from planner.types import Point, SonarShape, Track
-from vehicle_agent.config import SurveyConfig
 from vehicle_agent.survey import SurveyAgent
 
 SEES_TO_130_M = flat(0.3, 25, 130)
@@ -57,41 +55,6 @@ def announced(region: Region, heading_rad: float = 0.0, cell_m: float = 10) -> R
     )
 
 
-def surveyor(
-    run: RunInfo,
-    *,
-    nadir_gap_m: float = 40,
-    range_m: float = 145,
-    footprint: Footprint | None = None,
-    spacing: SpacingPlanner | None = None,
-) -> OneNode:
-    """A survey agent told of the run and of where its vehicle is."""
-    config = SurveyConfig(
-        vehicle=PRIMARY,
-        spacing=spacing or AdaptiveSpacing(nadir_gap_m, range_m),
-        footprint=footprint or SideLooking(SonarShape("side", nadir_gap_m, range_m)),
-        nadir_gap_m=nadir_gap_m,
-        range_m=range_m,
-        threshold=0.05,
-        hotspot_risk=0.6,
-        run_in_m=20,
-        endurance_ms=36_000_000,
-    )
-    agent = OneNode(SurveyAgent(config), Role.SURVEY)
-    agent.hear("run", run, at_ms=1)
-    agent.hear(f"veh/{PRIMARY}/nav", nav())
-    return agent
-
-
-def fly_all(agent: OneNode, p_detect: P_Detect, *, most: int = 60) -> None:
-    for _ in range(most):
-        maneuver = to_follow(agent)
-        if maneuver is None:
-            return
-        fly(agent, PRIMARY, maneuver, p_detect)
-    raise AssertionError(f"the agent asks for more than {most} tracks")
-
-
 def node_of(agent: OneNode) -> SurveyAgent:
     assert isinstance(agent.node, SurveyAgent)
     return agent.node
@@ -106,7 +69,7 @@ def assert_each_begins_at_its_nearer_end(tracks: Sequence[PlannedTrack]) -> None
 
 class TestPartByPart:
     def test_each_part_is_planned_in_turn_with_what_was_learned(self) -> None:
-        agent = surveyor(announced(L_SHAPE))
+        agent = on_its_way(survey(), announced(L_SHAPE))
         first = agent.last(Plan)
         assert first.note.startswith("part 1 of 2: spacing for 1")
         # Told 145 m, 300 and 500 m take 2 and 3 tracks; all are in the plan from the beginning.
@@ -132,7 +95,7 @@ class TestPartByPart:
     def test_the_second_part_is_begun_from_the_nearer_end(
         self, region: Region, far_m: float, first: int, begins_at_m: float
     ) -> None:
-        agent = surveyor(announced(region))
+        agent = on_its_way(survey(), announced(region))
         fly_all(agent, flat(0.3, 25, far_m))
         tracks = agent.last(Plan).tracks
         numbers = [track.number for track in tracks if track.start_x_m > (450 if region is STEPS else 300)]
@@ -141,7 +104,7 @@ class TestPartByPart:
         assert_each_begins_at_its_nearer_end(tracks)
 
     def test_below_three_nadir_gaps_the_next_part_begins_with_single_tracks(self) -> None:
-        agent = surveyor(announced(L_SHAPE))
+        agent = on_its_way(survey(), announced(L_SHAPE))
         fly_all(agent, flat(0.3, 25, 100))
         (second,) = (plan.note for plan in agent.all(Plan) if plan.note.startswith("part 2 of 2"))
         assert second.endswith("r_eff 100 m is below 3 r_min: the fewest single tracks over all that is left")
@@ -151,7 +114,7 @@ class TestPartByPart:
     # With the other sonar the tracks still to come, as they would lie now, leave most of their part unseen.
     @pytest.mark.parametrize("p_detect", [SEES_TO_130_M, flat(0.04, 25, 50)])
     def test_hotspots_lie_in_the_area_and_none_in_a_part_still_to_come(self, p_detect: P_Detect) -> None:
-        agent = surveyor(announced(WITH_ROCKS, cell_m=5))
+        agent = on_its_way(survey(), announced(WITH_ROCKS, cell_m=5))
         node = node_of(agent)
         later = node._parts[-1].area
         grid = node._grid
@@ -178,13 +141,13 @@ class TestPartByPart:
         # Three parts, of which the last one, 300 m wide, is laid once; it takes two tracks and the others three each.
         third = ((900.0, 1000.0), (1200.0, 1000.0), (1200.0, 1600.0), (900.0, 1600.0))
         region = Region((*STEPS.outline[:4], *third, *STEPS.outline[5:]))
-        agent = surveyor(announced(region), spacing=NarrowOnesLaidOnce(40, 133))
+        agent = on_its_way(survey(spacing=NarrowOnesLaidOnce(40, 133)), announced(region))
         fly_all(agent, flat(0.3, 25, 140))
         told = {sum(track.flown for track in plan.tracks): plan.tentative for plan in agent.all(Plan)}
         assert told == {0: 1 + 3 + 2, 1: 6, 2: 5, 3: 1, 4: 1, 5: 0, 6: 0, 7: 0, 8: 0}
 
     def test_the_parts_to_come_are_laid_by_what_the_last_track_saw(self) -> None:
-        agent = surveyor(announced(STEPS))
+        agent = on_its_way(survey(), announced(STEPS))
         for far_m in (135, 100, 100, 130):
             maneuver = to_follow(agent)
             assert maneuver is not None
@@ -194,7 +157,7 @@ class TestPartByPart:
         assert second_m == [120, 200, 250, 330]
 
     def test_a_part_of_which_every_track_is_refused_is_left_out(self) -> None:
-        agent = surveyor(announced(L_SHAPE))
+        agent = on_its_way(survey(), announced(L_SHAPE))
         for _ in range(2):
             maneuver = to_follow(agent)
             assert maneuver is not None
@@ -206,7 +169,7 @@ class TestPartByPart:
 
 
 def test_hotspots_are_looked_for_each_30_s_where_there_were_looks() -> None:
-    agent = surveyor(announced(L_SHAPE))
+    agent = on_its_way(survey(), announced(L_SHAPE))
     node, maneuver = node_of(agent), to_follow(agent)
     assert maneuver is not None
     fly(agent, PRIMARY, maneuver, SEES_TO_130_M)
@@ -226,7 +189,7 @@ def test_what_a_sonar_that_looks_ahead_may_still_see_of_a_track() -> None:
     # It sees 50 m ahead, and its swath begins 30 m ahead: a track of 400 m is flown from 30 m before it to 30 m before
     # its end, from where it sees 20 m beyond.
     wedge = ForwardLooking(SonarShape("wedge", 3, 50, math.pi / 4, 10))
-    node = node_of(surveyor(run_info(100, 400), nadir_gap_m=0, range_m=30, footprint=wedge))
+    node = node_of(on_its_way(survey(nadir_gap_m=0, range_m=30, footprint=wedge), run_info(100, 400)))
     north, south = node.ahead[:2]
     assert (north.start[1], south.start[1]) == (0, 400)
     assert astuple(node._still_ahead(north)) == pytest.approx((north.across_m, -30, 420))
@@ -237,7 +200,7 @@ def test_which_cells_tracks_of_a_part_may_see() -> None:
     # The second part lies from 300 to 800 m and up to 300 m; a cell, a look's bin and what is seen ahead are kept
     # beyond its ends, 10 + 8 + 50 m.
     wedge = ForwardLooking(SonarShape("wedge", 3, 50, math.pi / 4, 10))
-    agent = surveyor(announced(L_SHAPE), footprint=wedge)
+    agent = on_its_way(survey(footprint=wedge), announced(L_SHAPE))
     node, maneuver = node_of(agent), to_follow(agent)
     assert maneuver is not None
     agent.hear(f"veh/{PRIMARY}/look", replace(look(maneuver, 1, 0, 4, SEES_TO_130_M), along_bin_m=8))
@@ -255,7 +218,7 @@ class TestAnyArea:
     def test_a_survey_ends_and_settles_the_area_and_nothing_else(
         self, region: Region, heading_rad: float, reaches_m: list[int]
     ) -> None:
-        agent = surveyor(announced(region, heading_rad, cell_m=40), nadir_gap_m=20, range_m=90)
+        agent = on_its_way(survey(nadir_gap_m=20, range_m=90), announced(region, heading_rad, cell_m=40))
         for number in range(2000):
             maneuver = to_follow(agent)
             if maneuver is None:
@@ -271,14 +234,14 @@ class TestAnyArea:
         # The first pair lies 102 m apart, for 142 m: the second, which sees to 140 m, does not reach all of the gap of
         # the first.
         outline = (100.0, 111.0), (281.0, 597.71), (-103.0, 289.4), (-319.0, 111.0), (-50.5, 23.53), (185.5, -210.3)
-        agent = surveyor(announced(Region(outline), 3.353515625, cell_m=20))
+        agent = on_its_way(survey(), announced(Region(outline), 3.353515625, cell_m=20))
         fly_all(agent, flat(0.3, 40, 140))
         assert agent.last(Plan).note == "the survey ends, 7.05% of the area is not seen"
 
     @settings(max_examples=15)
     @given(regions(), st.floats(0, 6.2))
     def test_a_sonar_that_sees_as_told_leaves_nothing_unseen(self, region: Region, heading_rad: float) -> None:
-        agent = surveyor(announced(region, heading_rad, cell_m=20), range_m=140)
+        agent = on_its_way(survey(range_m=140), announced(region, heading_rad, cell_m=20))
         fly_all(agent, flat(0.3, 40, 140))
         node = node_of(agent)
         assert node.coverage is not None
@@ -295,13 +258,13 @@ class TestGroundToKeepOutOf:
         told = replace(
             announced(region), keep_out=(Zone(tuple(Vertex(*corner) for corner in zone)),), keep_out_margin_m=1.5
         )
-        agent = surveyor(told)
+        agent = on_its_way(survey(), told)
         fly_all(agent, SEES_TO_130_M)
         return node_of(agent), list(agent.last(Plan).tracks)
 
     def test_a_track_that_it_cuts_is_flown_piece_by_piece_before_the_next_are_laid(self) -> None:
         # A buoy on the line of a track; all of a pair's pieces are flown before that is decided on anew.
-        across_m = next(iter(node_of(surveyor(announced(self.FIELD))).ahead)).across_m
+        across_m = next(iter(node_of(on_its_way(survey(), announced(self.FIELD))).ahead)).across_m
         zone = tuple((x_m - 200.0 + across_m, y_m) for x_m, y_m in self.BUOY)
         node, tracks = self.flown(zone, self.FIELD)
         assert [track.number for track in tracks] == list(range(1, len(tracks) + 1))
@@ -311,7 +274,7 @@ class TestGroundToKeepOutOf:
         # Grown it is 11 m wide. A circle of 20 m beside the track touches its corner, 5.5 m to the side, where it
         # begins sqrt(20^2 - 14.5^2) = 13.8 m before it; before that come 20 m of run-out. Looked for metre by metre.
         assert [(piece.start_y_m, piece.end_y_m) for piece in pieces] == [(0.0, 260.0), (340.0, 600.0)]
-        free = surveyor(announced(self.FIELD))
+        free = on_its_way(survey(), announced(self.FIELD))
         fly_all(free, SEES_TO_130_M)
         assert len(tracks) == len(free.last(Plan).tracks) + 1
         assert len(node.r_adpt_m) == len(node_of(free).r_adpt_m)
@@ -319,7 +282,7 @@ class TestGroundToKeepOutOf:
     def test_who_is_not_announced_is_taken_to_turn_on_the_spot(self) -> None:
         zone = Zone(tuple(Vertex(x_m - 80.0, y_m) for x_m, y_m in self.BUOY))
         told = replace(announced(self.FIELD), keep_out=(zone,), keep_out_margin_m=1.5, vehicles=())
-        first, second = surveyor(told).last(Plan).tracks[:2]
+        first, second = on_its_way(survey(), told).last(Plan).tracks[:2]
         # 5.5 m about the buoy's middle, at (120, 300), and 20 m before and behind; looked for metre by metre.
         assert (first.across_m, first.start_y_m, first.end_y_m) == (120, 0, 274)
         assert (second.across_m, second.start_y_m, second.end_y_m) == (120, 326, 600)
@@ -329,7 +292,7 @@ class TestGroundToKeepOutOf:
         field = ((0.0, 0.0), (700.0, 0.0), (700.0, 600.0), (400.0, 600.0))
         region = Region((*field, (400.0, 400.0), (300.0, 400.0), (300.0, 600.0), (0.0, 600.0)))
         far_off = (Zone((Vertex(2000, 2000), Vertex(2010, 2000), Vertex(2010, 2010))),)
-        agent = surveyor(replace(announced(region), keep_out=far_off, keep_out_margin_m=1.5))
+        agent = on_its_way(survey(), replace(announced(region), keep_out=far_off, keep_out_margin_m=1.5))
         tracks = agent.last(Plan).tracks
         begins = [(track.number, track.start_y_m) for track in tracks]
         assert begins == [(1, 0.0), (2, 600.0), (3, 0.0), (4, 600.0), (5, 0.0)]
@@ -337,7 +300,7 @@ class TestGroundToKeepOutOf:
 
     def test_a_track_whose_ends_are_as_far_is_begun_as_it_was_laid(self) -> None:
         far_off = (Zone((Vertex(2000, 2000), Vertex(2010, 2000), Vertex(2010, 2010))),)
-        node = node_of(surveyor(replace(announced(self.FIELD), keep_out=far_off, keep_out_margin_m=1.5)))
+        node = node_of(on_its_way(survey(), replace(announced(self.FIELD), keep_out=far_off, keep_out_margin_m=1.5)))
         part = node._parts[0]
         for begin_m, end_y_m in ((0, 300.0), (0, 299.0), (600, 301.0)):
             before = [Track(0, 0.0, (0.0, 600.0), (0.0, end_y_m))]

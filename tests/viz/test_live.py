@@ -8,17 +8,16 @@ import select
 import signal
 import subprocess
 import sys
-import time
 import urllib.request
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import psutil  # type: ignore[import-untyped]
 import pytest
 import rerun as rr
+from flights import until
 from rerun.experimental import ViewerClient
 
 from comms.node import Received
@@ -37,14 +36,6 @@ from viz.viewer_program import ViewerError
 RUN = "tellaro-run"
 PATIENCE_S = 30.0
 PIECE_ENDS = b"RRF2FOOT\x01\0\0\0"  # the last bytes of a recording
-
-
-def wait_until(holds: Callable[[], Any]) -> None:
-    """Fails where it does not come to hold; how long it takes is not judged."""
-    deadline = time.monotonic() + PATIENCE_S
-    while not holds():
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
 
 
 def is_gone(pid: int) -> bool:
@@ -66,7 +57,7 @@ def watched(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[LiveServer, int]]
                 viewer.kill()
             server.window.wait()
     # The server goes with its window.
-    wait_until(lambda: server.process.poll() is not None)
+    assert until(lambda: server.process.poll() is not None)
 
 
 def client_of(server: LiveServer) -> ViewerClient:
@@ -116,12 +107,13 @@ def test_a_viewer_shows_what_is_recorded_so_far(
     half_ms = messages[len(messages) // 2].header.sent_ms
     with watched(monkeypatch) as (server, _):
         client = client_of(server)
-        # Positions are held back for a minute.
-        path = record_all(
-            server.pipe, tmp_path, messages, lambda: wait_until(lambda: shown_until_ms(client) >= half_ms - 61_000)
-        )
-        wait_until(lambda: shown_until_ms(client) == messages[-1].header.sent_ms)
-        wait_until(lambda: len(client.get_state().views) == VIEWS)
+
+        def half_is_shown() -> None:  # positions are held back for a minute
+            assert until(lambda: shown_until_ms(client) >= half_ms - 61_000)
+
+        path = record_all(server.pipe, tmp_path, messages, half_is_shown)
+        assert until(lambda: shown_until_ms(client) == messages[-1].header.sent_ms)
+        assert until(lambda: len(client.get_state().views) == VIEWS)
         state = client.get_state()
     assert [one.store_id for one in state.recordings] == [f"Recording:secondlook:{RUN}"]
     assert [report for view in state.views for report in view.reports] == []
@@ -178,7 +170,7 @@ def test_what_a_stalled_reader_does_not_take_is_bounded_and_counted(
         feed.stream.log("noise", rr.Tensor(noise))
         return feed.dropped >= wanted
 
-    wait_until(lambda: drops(2))
+    assert until(lambda: drops(2))
     feed.close()
     assert feed.dropped >= 2
     os.close(reader)
@@ -202,7 +194,7 @@ def test_the_pipe_stays_open_as_long_as_the_window(monkeypatch: pytest.MonkeyPat
     for viewer in psutil.Process(server.window.pid).children():
         viewer.kill()
     server.window.wait()
-    wait_until(lambda: server.process.poll() is not None)
+    assert until(lambda: server.process.poll() is not None)
     closed_at_last = ends.poll(0) == [(reader, select.POLLHUP)]
     os.close(reader)
     assert (open_afterwards, serves_afterwards, closed_at_last) == (True, True, True)
@@ -245,7 +237,7 @@ def test_a_live_view_does_not_wait_for_the_pieces_of_the_file(
     until_ms, poses = messages[0].header.sent_ms + 30_000, f"/fleet/{PRIMARY}"
     stream = (received for received in messages if received.header.sent_ms <= until_ms)
     with recorded_live(stream, tmp_path, monkeypatch) as rows_shown:
-        wait_until(lambda: rows_shown(poses) > 20)
+        assert until(lambda: rows_shown(poses) > 20)
         in_file = rows_so_far(tmp_path / "mission.rrd", poses)
     assert in_file == 0
     assert rows_so_far(tmp_path / "mission.rrd", poses) > 20
@@ -257,7 +249,7 @@ def test_hotspots_are_told_as_soon_as_all_of_their_time_are_in(
     run, hotspot = (next(one for one in messages if isinstance(one.message, kind)) for kind in (RunInfo, Hotspot))
     after = [one for one in messages if isinstance(one.message, Nav) and one.header.order > hotspot.header.order]
     with recorded_live([run, hotspot, *after[:10]], tmp_path, monkeypatch) as rows_shown:
-        wait_until(lambda: rows_shown(f"/log/{PRIMARY}") == 1)
+        assert until(lambda: rows_shown(f"/log/{PRIMARY}") == 1)
 
 
 @pytest.mark.usefixtures("drawable")
@@ -269,7 +261,7 @@ def test_a_viewer_that_comes_late_gets_everything(
         record_all(server.pipe, tmp_path, messages, lambda: None)
         server.open_window()
         client = client_of(server)
-        wait_until(lambda: shown_until_ms(client) == messages[-1].header.sent_ms)
+        assert until(lambda: shown_until_ms(client) == messages[-1].header.sent_ms)
         assert server.window is not None
         os.killpg(server.window.pid, signal.SIGKILL)
         server.window.wait()
@@ -304,7 +296,7 @@ with LiveServer({RUN!r}, web=True) as server:
         pid, folder = command.stdout.readline().split()
         assert not is_gone(int(pid))
         command.kill()
-    wait_until(lambda: is_gone(int(pid)) and not Path(folder).exists())
+    assert until(lambda: is_gone(int(pid)) and not Path(folder).exists())
 
 
 def test_a_window_that_cannot_open_is_told_and_nothing_is_left(monkeypatch: pytest.MonkeyPatch) -> None:

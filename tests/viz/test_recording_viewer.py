@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import subprocess
 import sys
-import time
 import urllib.request
-from collections.abc import Callable
 from pathlib import Path
 
 import psutil  # type: ignore[import-untyped]
 import pytest
+from flights import until
 from rerun.experimental import ViewerClient
 
 from comms.node import Received
@@ -20,14 +19,6 @@ from viz.recording_viewer import RecordingViewer
 from viz.viewer_program import LISTENING, ViewerError, server_url
 
 PATIENCE_S = 30.0
-
-
-def wait_until(holds: Callable[[], bool]) -> None:
-    """Fails where it does not come to hold; how long it takes is not judged."""
-    deadline = time.monotonic() + PATIENCE_S
-    while not holds():
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
 
 
 @pytest.mark.usefixtures("drawable")
@@ -45,8 +36,8 @@ def test_the_window_shows_the_recording(
             lines = [line for one in client.get_state().recordings for line in one.timelines if line.name == "sim_time"]
             return max((line.end or 0 for line in lines), default=0) // 1_000_000
 
-        wait_until(lambda: shown_until_ms() == end_ms)
-        wait_until(lambda: len(client.get_state().views) == VIEWS)
+        assert until(lambda: shown_until_ms() == end_ms)
+        assert until(lambda: len(client.get_state().views) == VIEWS)
         assert [report for view in client.get_state().views for report in view.reports] == []
     assert viewer.process.poll() is not None
     assert not viewer.log.parent.exists()
@@ -57,7 +48,7 @@ def test_the_window_opens_at_a_moment(recording: Path, monkeypatch: pytest.Monke
     monkeypatch.setattr(recording_viewer, "WINDOW", ("--headless", "--window-size", "800x500"))
     with RecordingViewer([recording], web=False, at_s=12.5) as viewer:
         client = ViewerClient.connect(server_url(viewer.process, viewer.log))
-        wait_until(lambda: [one.current_time for one in client.get_state().recordings] == [12_500_000_000])
+        assert until(lambda: [one.current_time for one in client.get_state().recordings] == [12_500_000_000])
 
 
 def test_the_page_is_served_on_this_machine_alone(recording: Path) -> None:
@@ -84,8 +75,8 @@ with RecordingViewer([Path({str(recording)!r})], web=True) as viewer:
         pid, folder = command.stdout.readline().split()
         assert psutil.pid_exists(int(pid))
         command.kill()
-    wait_until(lambda: not Path(folder).exists())
-    wait_until(lambda: not psutil.pid_exists(int(pid)) or psutil.Process(int(pid)).status() == psutil.STATUS_ZOMBIE)
+    assert until(lambda: not Path(folder).exists())
+    assert until(lambda: not psutil.pid_exists(int(pid)) or psutil.Process(int(pid)).status() == psutil.STATUS_ZOMBIE)
 
 
 def test_a_viewer_that_does_not_start_is_told(recording: Path, monkeypatch: pytest.MonkeyPatch) -> None:

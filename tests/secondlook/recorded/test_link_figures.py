@@ -2,27 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
+from fleets import state
+from modems import said, state_heard
 
-from fleets import ROSTER, state, with_modems
-
-from comms.node import Received
-from comms.runner import Stamp
-from comms.said.codec import Header, body_of, packed
-from comms.said.messages import Heard, Packet
-from comms.said.routing import Routing
+from comms.said.messages import Packet
 from secondlook.recorded.link_figures import LinkFigures
-
-ROUTING = Routing(with_modems(ROSTER))
-
-
-def said(sender: str, key: str, message: Any, at_ms: int) -> Received:
-    return Stamp(sender, ROUTING)(key, message, at_ms).opened()
-
-
-def state_heard(sent_ms: int, at_ms: int) -> Received:
-    payload = packed(Header("beta", 0, 0, sent_ms), body_of(state()))
-    return said("modem-ship", "modem/ship/heard", Heard("agent/beta/state", payload), at_ms)
 
 
 def test_ages_grow_until_something_newer_is_heard() -> None:

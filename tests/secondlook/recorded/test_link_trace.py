@@ -4,20 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
-from fleets import ROSTER, state, with_modems
 from flights import BRIEF
 from html_page import Page
-from modems import RUN_INFO, config_of
+from modems import RUN_INFO, config_of, said, state_heard
 
 import secondlook
 from comms.node import Received
-from comms.runner import Stamp
-from comms.said.codec import Header, body_of, packed
 from comms.said.messages import Heard, Packet
-from comms.said.routing import Routing
 from modem.overheard import Contents
 from secondlook.recorded.link_trace import IN_WORDS, LinkSeries, LinkTrace, SentPacket, Word
 from secondlook.report import report_page
@@ -25,18 +20,8 @@ from secondlook.report.link import link_report, platform_figures
 from secondlook.testing import Fleet, Flight
 from tests.viz.recordings import entities, rows
 
-ROUTING = Routing(with_modems(ROSTER))
 CONFIG = config_of("ship", frame_bits=64, frames=2, slot_ms=5000)
 """Three platforms: a cycle takes 15 s, a figure is over 30 s, and slots can carry 6 times 128 bits in that."""
-
-
-def said(sender: str, key: str, message: Any, at_ms: int) -> Received:
-    return Stamp(sender, ROUTING)(key, message, at_ms).opened()
-
-
-def state_heard(sent_ms: int, at_ms: int) -> Received:
-    payload = packed(Header("beta", 0, 0, sent_ms), body_of(state()))
-    return said("modem-ship", "modem/ship/heard", Heard("agent/beta/state", payload), at_ms)
 
 
 MESSAGES = [
