@@ -118,7 +118,7 @@ def _text(chart: Chart, source: Path, cell_m: int, limit_s: int) -> str:
         f"origin: {_place(origin, 4)}   # where x 0, y 0 is: the south-west corner",
         "area:",
         "  polygon_deg:                # corners in order: latitude, longitude, WGS84",
-        *_ring(chart.area, "    "),
+        *_ring(chart.area),
         *_holes(chart.holes),
         *_keep_out(chart.keep_out),
         "  track_heading_deg: auto     # the heading that needs the fewest; or degrees",
@@ -167,10 +167,10 @@ def _place(place: tuple[float, float], decimals: int) -> str:
     return f"{{latitude_deg: {place[0]:.{decimals}f}, longitude_deg: {place[1]:.{decimals}f}}}"
 
 
-def _ring(ring: Ring, indent: str, before: str = "", after: str = "") -> list[str]:
+def _ring(ring: Ring, before: str = "", after: str = "") -> list[str]:
     """A ring in lines that are not too long; `before` stands in the first, `after` at the end."""
-    lines = [f"{indent}{before}["]
-    indent += " " * (len(before) + 1)
+    lines = [f"    {before}["]
+    indent = " " * (len(before) + 5)
     for index, (latitude_deg, longitude_deg) in enumerate(ring):
         word = f"[{latitude_deg:.7f}, {longitude_deg:.7f}]" + ("," if index < len(ring) - 1 else "]")
         if len(lines[-1]) + len(word) > WIDTH:
@@ -181,21 +181,17 @@ def _ring(ring: Ring, indent: str, before: str = "", after: str = "") -> list[st
 
 
 def _holes(holes: Iterable[Ring]) -> list[str]:
-    found = [line for hole in holes for line in _ring(hole, "    ", "- ")]
+    found = [line for hole in holes for line in _ring(hole, "- ")]
     remark = "# what lies in it and need not be surveyed"
     return [f"  holes_deg:                  {remark}", *found] if found else [f"  holes_deg: []               {remark}"]
 
 
 def _keep_out(zones: Iterable[Ring]) -> list[str]:
-    found = [line for zone in zones for line in _ring(zone, "    ", "- ")]
+    found = [line for zone in zones for line in _ring(zone, "- ")]
     return ["  keep_out_deg:               # what no vehicle may enter", *found] if found else []
 
 
 def _priorities(priorities: Iterable[tuple[Ring, float]]) -> list[str]:
-    found = [
-        line
-        for ring, weight in priorities
-        for line in _ring(ring, "    ", "- {polygon_deg: ", f", weight: {weight:g}}}")
-    ]
+    found = [line for ring, weight in priorities for line in _ring(ring, "- {polygon_deg: ", f", weight: {weight:g}}}")]
     remark = "# ground that counts more in second looks"
     return [f"  priorities:                 {remark}", *found] if found else [f"  priorities: []              {remark}"]
