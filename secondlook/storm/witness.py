@@ -283,7 +283,7 @@ class CoordinatorWitness:
                 self._check_offer(key.split("/")[2], message.strip, now_ms)
             elif isinstance(message, MissionOver) and not self.over:
                 self.over = True  # said again it decides nothing: more may have come by then than states tell of
-                if message.reason.startswith("every primary"):
+                if "no strip is left" in message.reason:
                     self._check_all_has_come(now_ms)
 
     def _check_offer(self, name: str, number: int, now_ms: int) -> None:

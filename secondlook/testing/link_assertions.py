@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
+from collections.abc import Mapping
 
 from comms.node import Received
-from comms.said.messages import Packet
+from comms.said.messages import AgentState, Packet
 from comms.said.topics import MODEM_TX
 from secondlook.errors import UserError
 from secondlook.fleet.link import coordinator_platform, deck_ms_of
+from secondlook.fleet.nodes import COORDINATOR
 from secondlook.recorded.link_figures import Age, LinkFigures
-from secondlook.testing.flight import Flight, check_limit, fail_if
+from secondlook.testing.flight import Flight, check_limit, fail_if, lives, reached
 
 
 def assert_bytes_across_water(flight: Flight, *, at_most_per_s: float) -> None:
@@ -58,11 +60,7 @@ def assert_age_at_most(flight: Flight, age_s: float, *, vehicle: str | None = No
     names = list(flight.scenario.vehicles)
     if vehicle not in (None, *names):
         raise UserError(f"vehicle: {vehicle} is not allowed; must be one of {', '.join(names)}")
-    figures = LinkFigures()
-    for one in flight.heard:
-        figures.hear(one)
-    ages = figures.ages(by_modem=flight.scenario.link is not None, hub=coordinator_platform(flight.scenario))
-    problems, end_ms = [], round(flight.end_s * 1000)
+    ages, problems, end_ms = _ages(flight), list[str](), round(flight.end_s * 1000)
     for name in names if vehicle is None else [vehicle]:
         age = ages.get(name, Age())
         mean_s, largest_s = age.mean_s(end_ms) or 0.0, age.largest_ms / 1000
@@ -72,3 +70,19 @@ def assert_age_at_most(flight: Flight, age_s: float, *, vehicle: str | None = No
             problems.append(f"{name}: {largest_s:.1f} s at {age.largest_at_ms / 1000:.3f} s")
     on_average = " on average" if mean else ""
     fail_if(problems, f"what the coordinator knew was older{on_average} than {age_s:g} s")
+
+
+def _ages(flight: Flight) -> Mapping[str, Age]:
+    """Of each vehicle that the coordinator has heard of how old that was; without a link by what trouble let through
+    of its states."""
+    if flight.scenario.link is not None:
+        figures = LinkFigures()
+        for one in flight.heard:
+            figures.hear(one)
+        return figures.ages(by_modem=True, hub=coordinator_platform(flight.scenario))
+    ages = defaultdict[str, Age](Age)
+    for life in lives(flight, COORDINATOR):
+        for at_ms, one in reached(flight, COORDINATOR, life):
+            if isinstance(one.message, AgentState):
+                ages[one.vehicle].hear(one.header.sent_ms, at_ms)
+    return ages

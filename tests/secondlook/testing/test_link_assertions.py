@@ -116,6 +116,25 @@ class TestAge:
         with pytest.raises(AssertionError, match="  helper: "):
             assert_age_at_most(ideal, 5)
 
+    @pytest.mark.parametrize(
+        ("trouble", "told"),
+        [  # states come at whole tens of seconds, and a few ms later are there
+            (lambda fleet: fleet.cut_off("helper", from_s=31, for_s=60), r"helper: 70\.0 s at 100\.0"),
+            (lambda fleet: fleet.drop("agent/helper/state", from_s=31, for_s=20), r"helper: 30\.0 s at 60\.0"),
+            (lambda fleet: fleet.delay("agent/helper/state", by_s=25, from_s=31), r"helper: 35\.0 s at "),
+            (lambda fleet: fleet.freeze("coordinator", at_s=31, for_s=40), r"primary: 41\.0 s at 71\.0"),
+        ],
+    )
+    def test_without_a_link_what_trouble_keeps_from_the_coordinator_is_not_known(
+        self, trouble: Callable[[Fleet], None], told: str, tmp_path: Path
+    ) -> None:
+        fleet = Fleet(BRIEF, folder=tmp_path, overrides={"mission.deadline_s": 120})
+        trouble(fleet)
+        flight = fleet.run()
+        with pytest.raises(AssertionError, match=told):
+            assert_age_at_most(flight, 29)
+        assert_age_at_most(flight, 71)
+
 
 def packet(message: Any) -> Packet:
     """What a modem has sent."""
