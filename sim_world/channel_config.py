@@ -41,9 +41,9 @@ class LossTable:
     share: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        _require(len(self.range_m) == len(self.share) > 0, "share", self.share, "one for each range")
-        _require(all(a < b for a, b in pairwise(self.range_m)), "range_m", self.range_m, "ascending")
-        _require(all(0.0 <= share <= 1.0 for share in self.share), "share", self.share, "0 to 1")
+        require(len(self.range_m) == len(self.share) > 0, "share", self.share, "one for each range")
+        require(all(a < b for a, b in pairwise(self.range_m)), "range_m", self.range_m, "ascending")
+        require(all(0.0 <= share <= 1.0 for share in self.share), "share", self.share, "0 to 1")
 
     def share_at(self, range_m: float, bits: int, rate_bps: float) -> float:
         """The share of frames lost at a range, whatever their size and rate."""
@@ -76,9 +76,9 @@ class SonarEquation:
     water: Water = SHELF_SEA
 
     def __post_init__(self) -> None:
-        _require(100.0 <= self.frequency_hz <= 1e6, "frequency_hz", self.frequency_hz, "100 to 1000000")
+        require(100.0 <= self.frequency_hz <= 1e6, "frequency_hz", self.frequency_hz, "100 to 1000000")
         fades = self.rician_k is not None
-        _require(not fades or self.modulation == "fsk", "rician_k", self.rician_k, "none with bpsk")
+        require(not fades or self.modulation == "fsk", "rician_k", self.rician_k, "none with bpsk")
 
     def share_at(self, range_m: float, bits: int, rate_bps: float) -> float:
         """The share of frames of so many bits lost at a range."""
@@ -119,7 +119,7 @@ class Signal:
             ("speed_mps", 100.0, 3e8),
             ("max_range_m", 1.0, FARTHEST_M),
         ):
-            _require(low <= getattr(self, name) <= high, name, getattr(self, name), f"{low:g} to {high:g}")
+            require(low <= getattr(self, name) <= high, name, getattr(self, name), f"{low:g} to {high:g}")
 
     @property
     def frame_bytes(self) -> int:
@@ -153,8 +153,8 @@ class Outage:
     loss: float = 1.0
 
     def __post_init__(self) -> None:
-        _require(0.0 < self.loss <= 1.0, "outages, loss", self.loss, "above 0, to 1")
-        _require(0.0 <= self.beyond_m <= FARTHEST_M, "outages, beyond_m", self.beyond_m, f"0 to {FARTHEST_M:g}")
+        require(0.0 < self.loss <= 1.0, "outages, loss", self.loss, "above 0, to 1")
+        require(0.0 <= self.beyond_m <= FARTHEST_M, "outages, beyond_m", self.beyond_m, f"0 to {FARTHEST_M:g}")
 
     @property
     def silences(self) -> bool:
@@ -181,13 +181,14 @@ class ChannelConfig:
     deck_ms: int = 0
 
     def __post_init__(self) -> None:
-        _require(len(set(self.platforms)) == len(self.platforms), "platforms", self.platforms, "different ones")
-        _require({name for name, _ in self.still} <= {*self.platforms}, "still", self.still, "among the platforms")
-        _require(0.0 <= self.loss < 1.0, "loss", self.loss, "0 to below 1")
+        require(len(set(self.platforms)) == len(self.platforms), "platforms", self.platforms, "different ones")
+        require({name for name, _ in self.still} <= {*self.platforms}, "still", self.still, "among the platforms")
+        require(0.0 <= self.loss < 1.0, "loss", self.loss, "0 to below 1")
         for outage in self.outages:
-            _require(outage.platform in (None, *self.platforms), "outages", outage.platform, "of a platform or of all")
+            require(outage.platform in (None, *self.platforms), "outages", outage.platform, "of a platform or of all")
 
 
-def _require(holds: bool, name: str, value: object, allowed: str) -> None:
+def require(holds: bool, name: str, value: object, allowed: str) -> None:
+    """Raises ValueError, and says what is allowed, where it does not hold."""
     if not holds:
         raise ValueError(f"{name}: {value}; allowed is {allowed}")

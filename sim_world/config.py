@@ -21,7 +21,7 @@ from planner.currents import FlowGrid
 from planner.keep_out import NOWHERE, KeepOut
 from planner.risk import HIGHEST_P_DETECT
 from planner.types import DetectionCurve, Point, SonarShape
-from sim_world.channel_config import ChannelConfig
+from sim_world.channel_config import ChannelConfig, require
 from sim_world.footprints import FOOTPRINTS
 from sim_world.kinds import ALIKE, MIXTURES
 from sim_world.layouts import Given, Layout, Uniform
@@ -55,16 +55,16 @@ class SeabedConfig:
     ripple_crests_rad: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
-        _require(self.kind in ("uniform", "patchy"), "kind", self.kind, "uniform or patchy")
+        require(self.kind in ("uniform", "patchy"), "kind", self.kind, "uniform or patchy")
         for name in ("ripple_fields", "vegetation_patches"):
-            _require(0 <= getattr(self, name) <= 10_000, name, getattr(self, name), "0 to 10000")
+            require(0 <= getattr(self, name) <= 10_000, name, getattr(self, name), "0 to 10000")
         low, high = self.scale_m
-        _require(0.1 <= low <= high <= FARTHEST_M, "scale_m", self.scale_m, f"ascending, 0.1 to {FARTHEST_M:.0f} m")
+        require(0.1 <= low <= high <= FARTHEST_M, "scale_m", self.scale_m, f"ascending, 0.1 to {FARTHEST_M:.0f} m")
         low, high = self.strength
-        _require(0.0 <= low <= high < 1.0, "strength", self.strength, "ascending, within [0, 1)")
+        require(0.0 <= low <= high < 1.0, "strength", self.strength, "ascending, within [0, 1)")
         low, high = self.ripple_crests_rad or (0.0, 0.0)
         apart = 0.0 <= low <= high < 2 * math.pi and high - low <= math.pi + ROUNDING_RAD
-        _require(apart, "ripple_crests_rad", self.ripple_crests_rad, "ascending, 0 to 2 pi, at most pi apart")
+        require(apart, "ripple_crests_rad", self.ripple_crests_rad, "ascending, 0 to 2 pi, at most pi apart")
 
 
 @dataclass(frozen=True)
@@ -90,11 +90,11 @@ class EstimateConfig:
     def __post_init__(self) -> None:
         for name in ("bias", "bias_at_reach", "bias_after_turn"):
             low, high = BIASES
-            _require(low <= getattr(self, name) <= high, name, getattr(self, name), f"{low:g} to {high:g}")
-        _require(0.01 <= self.turn_m <= 1e4, "turn_m", self.turn_m, "0.01 to 10000 m")
-        _require(0.0 <= self.drift_per_km <= LARGEST_NOISE, "drift_per_km", self.drift_per_km, "0 to 2")
+            require(low <= getattr(self, name) <= high, name, getattr(self, name), f"{low:g} to {high:g}")
+        require(0.01 <= self.turn_m <= 1e4, "turn_m", self.turn_m, "0.01 to 10000 m")
+        require(0.0 <= self.drift_per_km <= LARGEST_NOISE, "drift_per_km", self.drift_per_km, "0 to 2")
         along_m = self.noise_along_m
-        _require(along_m is None or 0.01 <= along_m <= 1e4, "noise_along_m", along_m, "0.01 to 10000 m")
+        require(along_m is None or 0.01 <= along_m <= 1e4, "noise_along_m", along_m, "0.01 to 10000 m")
 
     @property
     def without_chance(self) -> EstimateConfig:
@@ -134,37 +134,37 @@ class SensorConfig:
 
     def __post_init__(self) -> None:
         ranges, values = self.curve.range_m, self.curve.p_detect
-        _require(
+        require(
             ranges.ndim == 1 and ranges.shape == values.shape and ranges.size >= 2,
             "curve", f"{ranges.size} ranges and {values.size} values", "as many values as ranges, at least two",
         )  # fmt: skip
-        _require(
+        require(
             bool(ranges[0] >= 0.0 and np.all(np.diff(ranges) > 0.0) and ranges[-1] <= FARTHEST_RANGE_M),
             "curve", "its ranges", f"ascending, 0 to {FARTHEST_RANGE_M:.0f} m",
         )  # fmt: skip
         sound = bool(np.all((values >= 0.0) & (values <= HIGHEST_P_DETECT)))
-        _require(sound, "curve", "its values", f"0 to {HIGHEST_P_DETECT}")
+        require(sound, "curve", "its values", f"0 to {HIGHEST_P_DETECT}")
         for name in ("along_bin_m", "range_bin_m", "look_m"):
-            _require(0.01 <= getattr(self, name) <= 1e4, name, getattr(self, name), "0.01 to 10000 m")
+            require(0.01 <= getattr(self, name) <= 1e4, name, getattr(self, name), "0.01 to 10000 m")
         per_look = self.look_m / self.along_bin_m
-        _require(
+        require(
             round(per_look) >= 1 and math.isclose(per_look, round(per_look), rel_tol=1e-9),
             "look_m", self.look_m, f"a whole multiple of along_bin_m, {self.along_bin_m}",
         )  # fmt: skip
-        _require(self.footprint in FOOTPRINTS, "footprint", self.footprint, " or ".join(FOOTPRINTS))
+        require(self.footprint in FOOTPRINTS, "footprint", self.footprint, " or ".join(FOOTPRINTS))
         cells = 2 * math.prod(self.look_bins)
-        _require(cells <= LARGEST_LOOK_CELLS, "look_m", f"{cells} cells a look", f"at most {LARGEST_LOOK_CELLS}")
+        require(cells <= LARGEST_LOOK_CELLS, "look_m", f"{cells} cells a look", f"at most {LARGEST_LOOK_CELLS}")
         for name in ("noise_cell", "noise_track"):
-            _require(0.0 <= getattr(self, name) <= LARGEST_NOISE, name, getattr(self, name), "0 to 2")
-        _require(0.0 <= self.seabed_share <= 1.0, "seabed_share", self.seabed_share, "0 to 1")
+            require(0.0 <= getattr(self, name) <= LARGEST_NOISE, name, getattr(self, name), "0 to 2")
+        require(0.0 <= self.seabed_share <= 1.0, "seabed_share", self.seabed_share, "0 to 1")
         half_rad = self.half_at_crab_rad
-        _require(half_rad is None or 1e-3 <= half_rad <= math.pi / 2, "half_at_crab_rad", half_rad, "0.001 to pi / 2")
+        require(half_rad is None or 1e-3 <= half_rad <= math.pi / 2, "half_at_crab_rad", half_rad, "0.001 to pi / 2")
         alarms = self.false_alarms_per_km2
-        _require(0.0 <= alarms <= 1e6, "false_alarms_per_km2", alarms, "0 to 1e6")
-        _require(0.0 < self.others_up_to <= 1.0, "others_up_to", self.others_up_to, "above 0, to 1")
+        require(0.0 <= alarms <= 1e6, "false_alarms_per_km2", alarms, "0 to 1e6")
+        require(0.0 < self.others_up_to <= 1.0, "others_up_to", self.others_up_to, "above 0, to 1")
         # The looks of a sector ahead overlap: their cells do not lie one behind the other.
         beside = self.footprint == "side" or self.estimate.noise_along_m is None
-        _require(beside, "estimate.noise_along_m", self.estimate.noise_along_m, "None but for the footprint side")
+        require(beside, "estimate.noise_along_m", self.estimate.noise_along_m, "None but for the footprint side")
 
     def sonar_over(self, seabed: Seabed, vehicle: str) -> SonarModel:
         """The true model of a vehicle's sonar over a seabed, of which it loses its share."""
@@ -205,8 +205,8 @@ class SettlingConfig:
     length_m: float
 
     def __post_init__(self) -> None:
-        _require(0.0 <= self.share < 1.0, "share", self.share, "0 to below 1")
-        _require(0.01 <= self.length_m <= 1e4, "length_m", self.length_m, "0.01 to 10000 m")
+        require(0.0 <= self.share < 1.0, "share", self.share, "0 to below 1")
+        require(0.01 <= self.length_m <= 1e4, "length_m", self.length_m, "0.01 to 10000 m")
 
 
 @dataclass(frozen=True)
@@ -222,9 +222,9 @@ class CurrentConfig:
     grid: FlowGrid | None = None
 
     def __post_init__(self) -> None:
-        _require(0.0 <= self.drift_mps <= 100.0, "drift_mps", self.drift_mps, "0 to 100")
-        _require(-7.0 <= self.set_rad <= 7.0, "set_rad", self.set_rad, "-7 to 7")
-        _require(self.period_s is None or 1.0 <= self.period_s <= 1e7, "period_s", self.period_s, "1 to 1e7 s")
+        require(0.0 <= self.drift_mps <= 100.0, "drift_mps", self.drift_mps, "0 to 100")
+        require(-7.0 <= self.set_rad <= 7.0, "set_rad", self.set_rad, "-7 to 7")
+        require(self.period_s is None or 1.0 <= self.period_s <= 1e7, "period_s", self.period_s, "1 to 1e7 s")
 
 
 @dataclass(frozen=True)
@@ -253,7 +253,7 @@ class VehicleConfig:
     home: Point | None = None
 
     def __post_init__(self) -> None:
-        _require(bool(IDENTIFIER.fullmatch(self.vehicle)), "vehicle", self.vehicle, f"a match of {IDENTIFIER.pattern}")
+        require(bool(IDENTIFIER.fullmatch(self.vehicle)), "vehicle", self.vehicle, f"a match of {IDENTIFIER.pattern}")
         for name, low, high in (
             ("start_x_m", -FARTHEST_M, FARTHEST_M),
             ("start_y_m", -FARTHEST_M, FARTHEST_M),
@@ -264,7 +264,7 @@ class VehicleConfig:
             ("position_error_m", 0.0, 1e4),
             ("position_drift_mps", 0.0, 1.0),
         ):
-            _require(low <= getattr(self, name) <= high, name, getattr(self, name), f"{low:g} to {high:g}")
+            require(low <= getattr(self, name) <= high, name, getattr(self, name), f"{low:g} to {high:g}")
 
 
 @dataclass(frozen=True)
@@ -286,15 +286,15 @@ class TargetsConfig:
     clutter_per_km2: float = 0.0
 
     def __post_init__(self) -> None:
-        _require(0 <= self.count <= LARGEST_LOOK_TARGETS, "count", self.count, f"0 to {LARGEST_LOOK_TARGETS}")
+        require(0 <= self.count <= LARGEST_LOOK_TARGETS, "count", self.count, f"0 to {LARGEST_LOOK_TARGETS}")
         given = not isinstance(self.layout, Given) or len(self.layout.places_m) == self.count
-        _require(given, "count", self.count, "as many as there are places")
-        _require(0.0 <= self.correlation <= 1.0, "correlation", self.correlation, "0 to 1")
+        require(given, "count", self.count, "as many as there are places")
+        require(0.0 <= self.correlation <= 1.0, "correlation", self.correlation, "0 to 1")
         aspect_rad = self.aspect_rad
         wide = aspect_rad is None or LEAST_ASPECT_RAD <= aspect_rad <= LARGEST_ASPECT_RAD
-        _require(wide, "aspect_rad", aspect_rad, "5 degrees to pi")
-        _require(self.kinds in MIXTURES, "kinds", self.kinds, " or ".join(MIXTURES))
-        _require(0.0 <= self.clutter_per_km2 <= 1000.0, "clutter_per_km2", self.clutter_per_km2, "0 to 1000")
+        require(wide, "aspect_rad", aspect_rad, "5 degrees to pi")
+        require(self.kinds in MIXTURES, "kinds", self.kinds, " or ".join(MIXTURES))
+        require(0.0 <= self.clutter_per_km2 <= 1000.0, "clutter_per_km2", self.clutter_per_km2, "0 to 1000")
 
 
 @dataclass(frozen=True)
@@ -315,24 +315,19 @@ class WorldConfig:
     channel: ChannelConfig | None = None
 
     def __post_init__(self) -> None:
-        _require(self.seed >= 0, "seed", self.seed, "0 or more")
+        require(self.seed >= 0, "seed", self.seed, "0 or more")
         for name, outline in (("area", self.area), *(("holes", hole) for hole in self.holes)):
-            _require(len(outline) >= 3, name, f"{len(outline)} corners", "at least three")
-            _require(
+            require(len(outline) >= 3, name, f"{len(outline)} corners", "at least three")
+            require(
                 all(abs(coordinate) <= FARTHEST_M for corner in outline for coordinate in corner),
                 name, "its corners", f"at most {FARTHEST_M:.0f} m from the origin along each axis",
             )  # fmt: skip
         names = [vehicle.vehicle for vehicle in self.vehicles]
-        _require(len(set(names)) == len(names), "vehicles", ", ".join(names), "different names")
+        require(len(set(names)) == len(names), "vehicles", ", ".join(names), "different names")
         slowest_mps = min((vehicle.speed_mps for vehicle in self.vehicles), default=math.inf)
         holds = self.current is None or self.current.drift_mps < slowest_mps
-        _require(holds, "current", self.current, f"slower than every vehicle, {slowest_mps:g} m/s")
+        require(holds, "current", self.current, f"slower than every vehicle, {slowest_mps:g} m/s")
         if self.channel is not None:
             placed = {*names, *(name for name, _ in self.channel.still)}
             here = {*self.channel.platforms} <= placed
-            _require(here, "channel", ", ".join(self.channel.platforms), "vehicles of the world and what lies still")
-
-
-def _require(holds: bool, name: str, value: object, allowed: str) -> None:
-    if not holds:
-        raise ValueError(f"{name}: {value}; allowed is {allowed}")
+            require(here, "channel", ", ".join(self.channel.platforms), "vehicles of the world and what lies still")

@@ -11,6 +11,7 @@ import shapely
 
 from planner.types import FloatArray, Point
 from sim_world.area import MOST_BATCHES, Ground
+from sim_world.channel_config import require
 
 FARTHEST_APART_M = 1e5
 
@@ -42,9 +43,9 @@ class Lines:
     jitter_m: float = 0.0
 
     def __post_init__(self) -> None:
-        _require(-7.0 <= self.heading_rad <= 7.0, "heading_rad", self.heading_rad, "-7 to 7")
-        _require(1.0 <= self.rows_apart_m <= FARTHEST_APART_M, "rows_apart_m", self.rows_apart_m, "1 to 100000 m")
-        _require(0.0 <= self.jitter_m <= FARTHEST_APART_M, "jitter_m", self.jitter_m, "0 to 100000 m")
+        require(-7.0 <= self.heading_rad <= 7.0, "heading_rad", self.heading_rad, "-7 to 7")
+        require(1.0 <= self.rows_apart_m <= FARTHEST_APART_M, "rows_apart_m", self.rows_apart_m, "1 to 100000 m")
+        require(0.0 <= self.jitter_m <= FARTHEST_APART_M, "jitter_m", self.jitter_m, "0 to 100000 m")
 
     def places(self, ground: Ground, count: int, generator: np.random.Generator) -> FloatArray:
         """The places in their rows, each as far off as is drawn for it, drawn again where that is not in the ground.
@@ -98,8 +99,8 @@ class Clusters:
     spread_m: float = 50.0
 
     def __post_init__(self) -> None:
-        _require(1 <= self.count <= 1000, "count", self.count, "1 to 1000")
-        _require(0.1 <= self.spread_m <= FARTHEST_APART_M, "spread_m", self.spread_m, "0.1 to 100000 m")
+        require(1 <= self.count <= 1000, "count", self.count, "1 to 1000")
+        require(0.1 <= self.spread_m <= FARTHEST_APART_M, "spread_m", self.spread_m, "0.1 to 100000 m")
 
     def places(self, ground: Ground, count: int, generator: np.random.Generator) -> FloatArray:
         """What of the clusters lies in the ground; evenly there, where they are so wide that next to nothing does."""
@@ -131,8 +132,3 @@ def _axes(heading_rad: float) -> tuple[FloatArray, FloatArray]:
     """Unit vectors along a compass heading, and to the right of it."""
     sin, cos = math.sin(heading_rad), math.cos(heading_rad)
     return np.array([sin, cos]), np.array([cos, -sin])
-
-
-def _require(holds: bool, name: str, value: object, allowed: str) -> None:
-    if not holds:
-        raise ValueError(f"{name}: {value}; allowed is {allowed}")
