@@ -118,17 +118,16 @@ class _Many(NamedTuple):
 
 
 class _Counts(NamedTuple):
-    """A tuple of numbers from 0: how many there may be, and each."""
+    """A tuple of small numbers from 0: how many there may be."""
 
-    note: Counted
     most: int
 
     def put(self, writer: BitWriter, value: tuple[int, ...], around: Around, said: Mapping[str, Any]) -> None:
         writer.write_count(len(value), 3)
-        writer.write_counts(value, self.note.order(around))
+        writer.write_counts(value, _SMALL_COUNT.order(around))
 
     def get(self, reader: BitReader, around: Around, said: Mapping[str, Any]) -> tuple[int, ...]:
-        return reader.read_counts(self.note.order(around), _how_many(reader, self.most))
+        return reader.read_counts(_SMALL_COUNT.order(around), _how_many(reader, self.most))
 
 
 def _how_many(reader: BitReader, most: int) -> int:
@@ -158,7 +157,7 @@ def _packed_by(hint: Any, notes: tuple[Any, ...], where: str) -> Any:
         if isinstance(note, AtMost):
             entry = get_args(get_args(hint)[0])[0]
             if entry == Annotated[Count, _SMALL_COUNT]:
-                return _Counts(_SMALL_COUNT, note.count)
+                return _Counts(note.count)
             if isinstance(entry, type) and is_dataclass(entry):
                 return _Many(_packing_of(entry), note.count, _taken, partial(_made, entry))
             return _Many(_Packing({"": entry}, where), note.count, lambda one: {"": one}, lambda said: said[""])

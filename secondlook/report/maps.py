@@ -17,6 +17,7 @@ from secondlook.report.drawing import Element, as_pixels, data_url, drawing, ele
 from secondlook.report.words import FATE_CLASS, fate_in_words
 
 MOST_PIXELS = 1600  # of a map's side; what has more cells is drawn with every so many of them
+STRIP_ON_MAP = "on-map-"
 
 
 @dataclass(frozen=True)
@@ -129,8 +130,8 @@ def vehicle_classes(mission: RecordedMission) -> dict[str, str]:
     }
 
 
-def flown_map(mission: RecordedMission, risk: RiskMap, ids: str) -> Element:
-    """What was flown over the risk that is left. A strip's element has the id `ids` with its number."""
+def flown_map(mission: RecordedMission, risk: RiskMap) -> Element:
+    """What was flown over the risk that is left. A strip's element has the id STRIP_ON_MAP with its number."""
     paths, tracks = mission.paths, mission.tracks
     strips = strips_on_map(mission.strips)
     many = are_many(strips)
@@ -149,7 +150,7 @@ def flown_map(mission: RecordedMission, risk: RiskMap, ids: str) -> Element:
         *(_priority(frame, one) for one in mission.priorities),
         *(_path(frame, path, classes.get(vehicle, "helper"), unit_m) for vehicle, path in paths.items()),
         *(_track(frame, track, unit_m) for track in tracks),
-        *(_strip(frame, strip, ids) for strip in strips),
+        *(_strip(frame, strip) for strip in strips),
         *(
             _number(frame, strip, place_m)
             for strip, place_m in number_places(numbered, NUMBER_PX * unit_m, LABEL_PX * unit_m)
@@ -252,14 +253,14 @@ def _number(frame: MapFrame, strip: StripRecord, place_m: Point) -> Element:
     )
 
 
-def _strip(frame: MapFrame, strip: StripRecord, ids: str) -> Element:
+def _strip(frame: MapFrame, strip: StripRecord) -> Element:
     return element(
         "a",
         element("title", f"strip {strip.number}{', foreseen' * strip.foreseen}: {fate_in_words(strip)}"),
         element("path", d=frame.line(strip.polygon), class_="casing"),
         element("path", d=frame.line(strip.polygon), class_="outline"),
         href=f"#strip-{strip.number}",
-        id=f"{ids}{strip.number}",
+        id=f"{STRIP_ON_MAP}{strip.number}",
         class_=f"strip {FATE_CLASS[strip.state]}{' foreseen' * strip.foreseen}",
     )
 

@@ -29,7 +29,7 @@ from secondlook.recorded.mission import OnRead
 from secondlook.report.charts import histogram, risk_chart, risk_series, timeline
 from secondlook.report.drawing import LEVELS, Element, data_url, indexed_png, markup, palette
 from secondlook.report.link import link_report
-from secondlook.report.maps import are_many, flown_map, risk_map, strips_on_map, vehicle_classes
+from secondlook.report.maps import STRIP_ON_MAP, are_many, flown_map, risk_map, strips_on_map, vehicle_classes
 from secondlook.report.words import degrees_by_place, fate, log_lines, moments, place_in_words
 from secondlook.scenario import load_scenario, scenario_hash
 from secondlook.scenario.bundled import scenario_names
@@ -52,7 +52,6 @@ def _lockstep_command(mission: RecordedMission) -> str:
 
 
 WIDE_PX, NARROW_PX = 900.0, 360.0  # on a desk and on paper, and on a phone
-STRIP_ON_MAP = "on-map-"
 
 
 @dataclass(frozen=True)
@@ -128,7 +127,7 @@ def _flown(mission: RecordedMission) -> dict[str, Any]:
         "before_map": markup(risk_map(mission, before, "Residual risk before the second looks")),
         "after_map": markup(risk_map(mission, after, "Residual risk after the second looks")),
         "scale": Markup(data_url(indexed_png(np.arange(LEVELS, dtype=np.uint8)[np.newaxis], palette()))),
-        "flown_map": markup(flown_map(mission, after, STRIP_ON_MAP)),
+        "flown_map": markup(flown_map(mission, after)),
         "on_map": STRIP_ON_MAP,
         "many_strips": are_many(strips_on_map(mission.strips)),
         "moments": mattered,

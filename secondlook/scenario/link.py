@@ -43,7 +43,7 @@ class Loss(Mapping):
     @field_validator("share")
     @classmethod
     def _check_length(cls, share: tuple[float, ...], info: ValidationInfo) -> tuple[float, ...]:
-        return check_as_many(share, info, "range_m")
+        return check_as_many(share, info)
 
 
 class Sonar(Mapping):

@@ -60,7 +60,7 @@ class Curve(Mapping):
     @field_validator("p_detect")
     @classmethod
     def _check_length(cls, p_detect: tuple[float, ...], info: ValidationInfo) -> tuple[float, ...]:
-        return check_as_many(p_detect, info, "range_m")
+        return check_as_many(p_detect, info)
 
     @property
     def detection_curve(self) -> DetectionCurve:

@@ -105,8 +105,8 @@ def check_ascending(values: tuple[float, ...]) -> tuple[float, ...]:
     return values
 
 
-def check_as_many(values: tuple[float, ...], info: ValidationInfo, other: str) -> tuple[float, ...]:
-    """The values, if there are as many as of another key, which comes before; else what pydantic refuses."""
-    if other in info.data and len(values) != len(info.data[other]):
-        raise refused(f"must have as many entries as {other}, {len(info.data[other])} and not {len(values)}")
+def check_as_many(values: tuple[float, ...], info: ValidationInfo) -> tuple[float, ...]:
+    """The values, if there are as many as of `range_m`, which comes before; else what pydantic refuses."""
+    if "range_m" in info.data and len(values) != len(info.data["range_m"]):
+        raise refused(f"must have as many entries as range_m, {len(info.data['range_m'])} and not {len(values)}")
     return values
