@@ -77,6 +77,17 @@ class Step(NamedTuple):
 def checked_step(node: object, method: str, answer: Any) -> Step:
     """What a node, which may be a user's own, has answered to a method of its, what it holds as tuples. Raises
     ValueError, which names the node's class, for what is no `Step`, or one of other things than a step has."""
+    if (
+        type(answer) is Step
+        and type(answer.publish) is tuple
+        and (answer.wake_ms is None or type(answer.wake_ms) is int)
+        and not answer.dropped
+    ):
+        for one in answer.publish:
+            if type(one) is not Publication or type(one.key) is not str:
+                break
+        else:
+            return answer  # as nearly all are, and this is asked of each
     if not isinstance(answer, Step):
         raise ValueError(f"{_told_of(node)} must answer {method} with a comms.node.Step, not {reprlib.repr(answer)}")
     publish, wake_ms, dropped = _as_tuple(answer.publish), answer.wake_ms, _as_tuple(answer.dropped)
@@ -95,23 +106,20 @@ def checked_step(node: object, method: str, answer: Any) -> Step:
 
 
 def _told_of(node: object) -> str:
-    kind = type(node)
+    kind = type(getattr(node, "watched", node))
     return f"the node {kind.__module__}:{kind.__qualname__}"
 
 
 def _is_whole(given: Any) -> bool:
-    if type(given) is not int:  # as nearly all are
-        try:
-            operator.index(given)
-        except TypeError:
-            return False
+    try:
+        operator.index(given)
+    except TypeError:
+        return False
     return not isinstance(given, bool)
 
 
 def _as_tuple(given: Any) -> tuple[Any, ...]:
     """What it holds; of a text, or what holds nothing, something that nobody may say."""
-    if type(given) is tuple:
-        return given
     return tuple(given) if isinstance(given, Iterable) and not isinstance(given, str) else (None,)
 
 

@@ -181,10 +181,11 @@ class GuardedNode:
             with np.errstate():
                 if start:
                     self._note("start", self._node.start(now_ms), published)
-                for one in mail:
-                    received = self._opened(one)
-                    if received is not None:
-                        self._note("on_message", self._node.on_message(received, now_ms), published)
+                for received in mail:
+                    message = received.message
+                    opened = self._letters.open(message.key, message.payload) if type(message) is Heard else received
+                    if opened is not None:
+                        self._note("on_message", self._node.on_message(opened, now_ms), published)
                 if wake and self.is_due(now_ms):
                     self._note("on_wake", self._node.on_wake(now_ms), published)
         except (NodeError, *NO_FAILURES):
@@ -197,10 +198,6 @@ class GuardedNode:
         """Raises NodeError where the wake-up asked for is not later than now."""
         if self.is_due(now_ms):
             raise NodeError(f"{self.node_id} asks at {now_ms} ms to be woken at {self.wake_ms} ms, which is not later")
-
-    def _opened(self, received: Received) -> Received | None:
-        message = received.message
-        return self._letters.open(message.key, message.payload) if isinstance(message, Heard) else received
 
     def _note(self, method: str, answer: Step, published: list[Publication]) -> None:
         step = checked_step(self._node, method, answer)

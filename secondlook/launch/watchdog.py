@@ -14,7 +14,7 @@ from types import FrameType
 
 from comms.awake_clock import AwakeClock
 from comms.errors import Stop
-from comms.node import Node, Received, Step, checked_step
+from comms.node import Node, Received, Step
 from secondlook.errors import FAILED
 
 GRACE_S = 5.0  # for a call to heed its interruption, before the process is ended
@@ -94,18 +94,18 @@ class Watchdog:
 
 
 class WatchedNode:
-    """A node whose calls a watchdog watches, under its id. What is no answer is told here, where its class is known."""
+    """A node, `watched`, whose calls a watchdog watches, under its id."""
 
     def __init__(self, node_id: str, node: Node, watchdog: Watchdog) -> None:
         self._node_id = node_id
-        self._node = node
+        self.watched = node
         self._watchdog = watchdog
 
     def start(self, now_ms: int) -> Step:
         """The node's."""
         self._watchdog.begin(self._node_id, now_ms)
         try:
-            return checked_step(self._node, "start", self._node.start(now_ms))
+            return self.watched.start(now_ms)
         finally:
             self._watchdog.end()
 
@@ -113,7 +113,7 @@ class WatchedNode:
         """The node's."""
         self._watchdog.begin(self._node_id, now_ms)
         try:
-            return checked_step(self._node, "on_message", self._node.on_message(received, now_ms))
+            return self.watched.on_message(received, now_ms)
         finally:
             self._watchdog.end()
 
@@ -121,6 +121,6 @@ class WatchedNode:
         """The node's."""
         self._watchdog.begin(self._node_id, now_ms)
         try:
-            return checked_step(self._node, "on_wake", self._node.on_wake(now_ms))
+            return self.watched.on_wake(now_ms)
         finally:
             self._watchdog.end()

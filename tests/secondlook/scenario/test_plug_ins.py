@@ -337,7 +337,7 @@ SONAR = "ValueError: the sonar model of helper, own:"
 WRONG_SONARS = [
     ("Undecided", SONAR + r"Undecided, gives a P_d of nan at a range of \d+ m; must be 0 to 0\.999"),
     ("Certain", SONAR + r"Certain, gives a P_d of 1\.95 at a range of \d+ m; must be 0 to 0\.999"),
-    ("Negative", SONAR + r"Negative, gives a P_d of -0\.3 at a range of \d+ m; must be 0 to 0\.999"),
+    ("Negative", SONAR + r"Negative, gives a P_d of -0\.3\d* at a range of \d+ m; must be 0 to 0\.999"),
     ("Narrow", SONAR + r"Narrow, answers in the shape \(2, 4, 25\) to what has the shape \(2, 4, 26\)"),
     ("Wordy", SONAR + r"Wordy, must answer with an array of P_d, not 'well'"),
     ("Broken", r"IndexError: tuple index out of range \(own\.py, line \d+, in p_detect\)"),
