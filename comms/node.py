@@ -5,7 +5,6 @@ A node never reads a clock, a socket or a global random generator; `random_strea
 
 from __future__ import annotations
 
-import operator
 import reprlib
 import zlib
 from collections.abc import Iterable
@@ -16,6 +15,7 @@ import numpy as np
 from comms.said.codec import Header
 from comms.said.messages import Message
 from comms.said.topics import Topic, number_of
+from planner.types import whole_number
 
 if TYPE_CHECKING:  # Python's own knows no default before 3.13; without one every Received would have to say Message
     from typing_extensions import TypeVar
@@ -94,7 +94,7 @@ def checked_step(node: object, method: str, answer: Any) -> Step:
     wrong = None
     if not all(isinstance(one, Publication) and isinstance(one.key, str) for one in publish):
         wrong = "publish", "a tuple of comms.node.Publication, each with a key"
-    elif not (wake_ms is None or _is_whole(wake_ms)):
+    elif not (wake_ms is None or whole_number(wake_ms) is not None):
         wrong = "wake_ms", "whole milliseconds, or None"
     elif not all(isinstance(one, str) for one in dropped):
         wrong = "dropped", "a tuple of texts"
@@ -108,14 +108,6 @@ def checked_step(node: object, method: str, answer: Any) -> Step:
 def _told_of(node: object) -> str:
     kind = type(getattr(node, "watched", node))
     return f"the node {kind.__module__}:{kind.__qualname__}"
-
-
-def _is_whole(given: Any) -> bool:
-    try:
-        operator.index(given)
-    except TypeError:
-        return False
-    return not isinstance(given, bool)
 
 
 def _as_tuple(given: Any) -> tuple[Any, ...]:

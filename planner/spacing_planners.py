@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import operator
 import reprlib
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -11,7 +10,7 @@ from typing import Any, Protocol, runtime_checkable
 
 from planner.cover import fewest_tracks, spans_left
 from planner.spacing import adapt_range, track_offsets
-from planner.types import DetectionCurve
+from planner.types import DetectionCurve, whole_number
 
 LENGTH_TOLERANCE_M = 1e-6
 
@@ -72,7 +71,7 @@ def checked_decision(spacing: SpacingPlanner, method: str, answer: Any) -> Spaci
         raise ValueError(f"{told} {must}, not {reprlib.repr(answer)}")
     for name, must in (("range_m", "whole metres"), ("asks_after", "a whole number of tracks")):
         value = getattr(answer, name)
-        if not _is_whole(value) or value < 1:
+        if whole_number(value) is None or value < 1:
             given = f"answers {method} with {name} {reprlib.repr(value)}"
             raise ValueError(f"{told} {given}; must be {must}, 1 or more")
     given = f"answers {method} with offsets_m {reprlib.repr(answer.offsets_m)}"
@@ -101,14 +100,6 @@ def told_of(spacing: SpacingPlanner) -> str:
     """Who a spacing planner is, for a sentence."""
     kind = type(spacing)
     return f"the spacing planner {kind.__module__}:{kind.__qualname__}"
-
-
-def _is_whole(value: Any) -> bool:
-    try:
-        operator.index(value)
-    except TypeError:
-        return False
-    return not isinstance(value, bool)
 
 
 def checked_if_any(spacing: SpacingPlanner, method: str, answer: Any) -> SpacingDecision | None:

@@ -8,9 +8,10 @@ which tracks are laid side by side. Headings are compass headings: radians, cloc
 from __future__ import annotations
 
 import math
+import operator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,15 @@ Window = tuple[slice, slice]
 """Some rows and columns of a grid."""
 EVERYWHERE: Window = (slice(None), slice(None))
 OneOrMany = TypeVar("OneOrMany", float, FloatArray)
+
+
+def whole_number(given: Any) -> int | None:
+    """What somebody else's code has given as a whole number, an int or one of numpy's, as an int; None for anything
+    else, such as 1.0 or True."""
+    try:
+        return None if isinstance(given, bool) else operator.index(given)
+    except TypeError:
+        return None
 
 
 @dataclass(frozen=True)

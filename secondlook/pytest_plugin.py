@@ -173,9 +173,8 @@ def _check_storms(node: pytest.Item | pytest.Collector) -> None:
 def _numbers_of_storms(node: pytest.Item | pytest.Collector) -> list[int]:
     mark = node.get_closest_marker("storm")
     seeds = _STORMS if mark is None else mark.kwargs.get("seeds", _STORMS)
-    numbers = (
-        list(range(1, seeds + 1)) if isinstance(seeds, int) else list(seeds) if isinstance(seeds, Iterable) else []
-    )
+    asked = range(1, seeds + 1) if isinstance(seeds, int) else seeds
+    numbers = list(asked) if isinstance(asked, Iterable) else []
     if not numbers or not all(isinstance(one, int) and one >= 0 for one in numbers):
         allowed = "must be how many, at least 1, or a list of numbers of storms"
         raise pytest.UsageError(f"{node.nodeid}: mark storm: seeds {seeds!r} is not allowed; {allowed}")

@@ -4,7 +4,6 @@ offers may be made now."""
 from __future__ import annotations
 
 import math
-import operator
 import reprlib
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -16,6 +15,7 @@ from coordinator.allocate.cbba import CbbaAllocator
 from coordinator.allocate.routes import RoutesAllocator
 from coordinator.allocate.simple import FirstComeAllocator, GreedyAllocator, NearestAllocator, NoAllocator
 from coordinator.allocate.situation import Allocator, Helper, OpenStrip, Situation
+from planner.types import whole_number
 
 ALLOCATORS: Mapping[str, Callable[[], Allocator]] = MappingProxyType(
     {
@@ -67,10 +67,7 @@ def checked_offers(offers: Mapping[str, int], situation: Situation) -> list[tupl
 def strip_number(who: str, vehicle: object, given: Any) -> int:
     """The number of the strip that an allocator, `who` it is, gives to a vehicle: an int, or one of numpy's. Raises
     ValueError for anything else, such as 1.0 or True."""
-    try:
-        number = None if isinstance(given, bool) else operator.index(given)
-    except TypeError:
-        number = None
+    number = whole_number(given)
     if number is None:
         raise ValueError(f"{who} gives strip {reprlib.repr(given)} to {vehicle!r}; a strip's number must be an int")
     return number

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from planner.types import DetectionCurve, GridSpec, SonarShape, Strip, SweepFrame, Track
+from planner.types import DetectionCurve, GridSpec, SonarShape, Strip, SweepFrame, Track, whole_number
 
 HEADING_RAD = math.atan2(3, 4)
 FRAME = SweepFrame(100, 200, HEADING_RAD)
@@ -77,3 +77,15 @@ def test_a_curve_is_linear_in_between_and_0_outside() -> None:
 
 def test_a_sonar_of_which_no_more_is_told_looks_along_a_line_every_20_m() -> None:
     assert SonarShape("side", 5, 30) == SonarShape("side", 5, 30, half_angle_rad=0.0, look_m=20.0)
+
+
+@pytest.mark.parametrize(
+    ("given", "number"),
+    [
+        *((7, 7), (-1, -1), (np.int64(7), 7), (np.uint8(7), 7)),
+        *((given, None) for given in (1.0, np.float64(1), True, np.True_, "1", None, math.nan, np.ones(2, dtype=int))),
+    ],
+)
+def test_a_whole_number_is_an_int_or_one_of_numpys(given: object, number: int | None) -> None:
+    assert whole_number(given) == number
+    assert type(whole_number(given)) in (int, type(None))

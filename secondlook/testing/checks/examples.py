@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.errors import Flaky
 
 from comms.errors import NO_FAILURES, in_words
+from planner.types import whole_number
 from secondlook.launch.watchdog import NoReturn, Watchdog
 from secondlook.scenario.plug_ins import PlugInError, PlugInKind
 
@@ -125,4 +126,4 @@ def is_number(value: Any) -> bool:
 
 def is_whole(value: Any) -> bool:
     """Whether a value can stand for a whole number as it is."""
-    return not isinstance(value, bool) and hasattr(value, "__index__")
+    return whole_number(value) is not None
