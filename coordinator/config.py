@@ -17,6 +17,8 @@ from planner.types import BoolArray, FloatArray, GridSpec, PriorityGround
 
 ANSWER_WITHIN_MS = 10_000
 """Where everybody hears everybody."""
+GIVEN_UP_AFTER = 10
+"""So many times as long as for a helper is waited for a primary, without which nobody surveys."""
 
 
 def weights_over(grid: GridSpec, inside: BoolArray, priorities: Iterable[PriorityGround]) -> FloatArray:
@@ -31,14 +33,38 @@ def weights_over(grid: GridSpec, inside: BoolArray, priorities: Iterable[Priorit
 
 
 @dataclass(frozen=True)
+class Patience:
+    """How long a vehicle is waited for, milliseconds.
+
+    `silent_ms`: age of its state from which it is offered nothing; `lost_ms`, no less: from which it counts as lost,
+    and what it had is open again.
+    """
+
+    silent_ms: int
+    lost_ms: int
+
+    @property
+    def given_up_ms(self) -> int:
+        """Age of a primary's state from which the mission goes on without the rest of its survey: no less than for a
+        helper's strip to be open again."""
+        return max(GIVEN_UP_AFTER * self.silent_ms, self.lost_ms)
+
+    @property
+    def stuck_ms(self) -> int:
+        """For so long a primary that is heard may tell of no other place, work or ground before the same. It may hear
+        nothing, and then never surveys, though it says that it is there. Over a link most of where it is said to be is
+        reckoned, so that it may seem to stand still for as long as its words are lost."""
+        return GIVEN_UP_AFTER * self.lost_ms
+
+
+@dataclass(frozen=True)
 class CoordinatorConfig:
     """The mission ends at the latest at `deadline_factor` times the last primary's end, or at `deadline_s`; what does
     not hold is infinite.
-    `silent_after_ms`: age of a vehicle's state from which it is offered nothing; `lost_after_ms`: from which it counts
-    as lost, and what it had is open again. `answer_within_ms`: age of an offer from which no answer is expected any
-    more. `looks_within_ms`: for so long the looks over a strip may come later than the word that it is done; 0 where
-    they come before it. `ahead_ms`: so long before a vehicle is expected to be done with a strip it is offered its
-    next; 0 to wait until it is.
+    `patience`: how long a vehicle is waited for. `answer_within_ms`: age of an offer from which no answer is expected
+    any more. `looks_within_ms`: for so long the looks over a strip may come later than the word that it is done; 0
+    where they come before it. `ahead_ms`: so long before a vehicle is expected to be done with a strip it is offered
+    its next; 0 to wait until it is.
     `min_strip_m`, `max_strip_m`: length of a strip.
     `worth_risk`: mean residual risk over the swath from which a further metre of strip is worth flying, whatever time
     there is.
@@ -53,8 +79,7 @@ class CoordinatorConfig:
 
     allocator: Allocator
     deadline_factor: float
-    silent_after_ms: int
-    lost_after_ms: int
+    patience: Patience
     min_strip_m: float
     max_strip_m: float
     worth_risk: float

@@ -112,7 +112,7 @@ class Coordinator:
         config, agenda, outbox = self.config, self._agenda, self._outbox
         region = Region(run.outline, run.hole_outlines, run.keep_out_outlines)
         inside = region.inside(run.grid.spec)
-        self.fleet = fleet = KnownFleet(run, config.silent_after_ms, config.lost_after_ms, now_ms, config.flows)
+        self.fleet = fleet = KnownFleet(run, config.patience, now_ms, config.flows)
         ledger = Ledger(self._first_number)
         helpers = [one.entry for one in fleet.helpers]
         # Where none of them comes to from its home no second look goes.

@@ -10,6 +10,7 @@ import numpy as np
 from comms.node import Received
 from comms.said.announcement import RunInfo
 from comms.said.messages import CoverageTile
+from coordinator.config import Patience
 from coordinator.cut.window import Window
 from coordinator.vehicles import KnownVehicle
 from planner.currents import FlowGrid
@@ -19,23 +20,15 @@ from planner.risk import LevelArray
 
 log = logging.getLogger("secondlook.coordinator")
 
-GIVEN_UP_AFTER = 10
-"""So many times as long as for a silent vehicle must a primary be silent, or stand still, before the mission ends
-without it. One that stands still may hear nothing, and then never surveys, though it says each 10 s that it is there.
-"""
-
 
 class KnownFleet:
     """The fleet that the run's announcement names: `vehicles`, by name, and of these the `primaries`, which survey.
 
     `keep_out`: what none may enter. `flows`: of the water, where they are not alike everywhere. `map`: the tiles of
-    all, joined. `silent_after_ms`: age of a vehicle's state from which it is offered nothing; `lost_after_ms`: from
-    which it counts as lost, no less.
+    all, joined. `patience`: how long a vehicle is waited for.
     """
 
-    def __init__(
-        self, run: RunInfo, silent_after_ms: int, lost_after_ms: int, now_ms: int, flows: FlowGrid | None = None
-    ) -> None:
+    def __init__(self, run: RunInfo, patience: Patience, now_ms: int, flows: FlowGrid | None = None) -> None:
         self.map = FleetMap(run.grid.spec, run.rho)
         self.keep_out = KeepOut(run.keep_out_outlines, run.keep_out_margin_m)
         self.vehicles = {
@@ -43,8 +36,7 @@ class KnownFleet:
             for one in run.vehicles
         }
         self.primaries = {name: one for name, one in self.vehicles.items() if one.entry.role.surveys}
-        self._silent_after_ms, self._lost_after_ms = silent_after_ms, lost_after_ms
-        self._given_up_after_ms = GIVEN_UP_AFTER * silent_after_ms
+        self._patience = patience
         self._complained_of: set[str] = set()
 
     @property
@@ -60,20 +52,26 @@ class KnownFleet:
     def hear_tile(self, received: Received, tile: CoverageTile) -> bool:
         """Joins a tile to the map; returns whether it was news. One that does not fit the grid is dropped."""
         name, incarnation = received.vehicle, received.header.incarnation
-        if name in self.vehicles:
-            self.vehicles[name].arrivals.note_tile(incarnation, received.key, tile.version)
+        vehicle = self.vehicles.get(name)
+        if vehicle is not None:
+            vehicle.arrivals.note_tile(incarnation, received.key, tile.version)
         try:
-            return self.map.join(name, incarnation, tile)
+            is_news = self.map.join(name, incarnation, tile)
         except ValueError as error:
             if name not in self._complained_of:
                 self._complained_of.add(name)
                 log.warning("dropped a message from %s: %s (said once)", name, error)
             return False
+        if is_news and vehicle is not None:
+            vehicle.note_looks(received.header)
+        return is_news
 
     def lacking(self, now_ms: int) -> list[KnownVehicle]:
         """Those of whose tiles and hotspots something has not arrived, but for who is silent for so long that it is not
         waited for."""
-        return [one for one in self.vehicles.values() if now_ms - one.heard_ms < self._given_up_after_ms and one.lacks]
+        return [
+            one for one in self.vehicles.values() if now_ms - one.heard_ms < self._patience.given_up_ms and one.lacks
+        ]
 
     def levels(self, name: str, window: Window) -> LevelArray:
         """What a vehicle's own layer tells of a window's cells: the sum over its looks."""
@@ -86,20 +84,25 @@ class KnownFleet:
         """Finds of whom too long nothing was heard; returns who is lost that was not before."""
         lost = []
         for name, vehicle in self.vehicles.items():
-            vehicle.silent = now_ms - vehicle.heard_ms >= self._silent_after_ms
-            if not vehicle.lost and now_ms - vehicle.heard_ms >= self._lost_after_ms:
+            vehicle.silent = now_ms - vehicle.heard_ms >= self._patience.silent_ms
+            if not vehicle.lost and now_ms - vehicle.heard_ms >= self._patience.lost_ms:
                 vehicle.lost = True
                 lost.append(name)
                 log.info("%s is lost: nothing heard of it since %.0f s", name, vehicle.heard_ms / 1000)
         for vehicle in self.surveying:
-            if now_ms - vehicle.stirred_ms >= self._given_up_after_ms:
-                vehicle.give_up(now_ms)
-                how = "nothing heard of it" if vehicle.silent else "it has not stirred"
-                log.warning("%s is given up: %s since %.0f s", vehicle.entry.vehicle, how, vehicle.stirred_ms / 1000)
+            if now_ms - vehicle.told_ms >= self._patience.given_up_ms:
+                how, since_ms = "nothing heard of it", vehicle.told_ms
+            elif now_ms - vehicle.stirred_ms >= self._patience.stuck_ms:
+                how, since_ms = "it has not stirred", vehicle.stirred_ms
+            else:
+                continue
+            vehicle.give_up(now_ms)
+            log.warning("%s is given up: %s since %.0f s", vehicle.entry.vehicle, how, since_ms / 1000)
         return lost
 
     def deadlines_ms(self) -> Iterator[int]:
         """When somebody is silent, lost, or given up, if nothing is heard until then."""
-        yield from (one.heard_ms + self._silent_after_ms for one in self.vehicles.values() if not one.silent)
-        yield from (one.heard_ms + self._lost_after_ms for one in self.vehicles.values() if not one.lost)
-        yield from (one.stirred_ms + self._given_up_after_ms for one in self.surveying)
+        yield from (one.heard_ms + self._patience.silent_ms for one in self.vehicles.values() if not one.silent)
+        yield from (one.heard_ms + self._patience.lost_ms for one in self.vehicles.values() if not one.lost)
+        for one in self.surveying:
+            yield min(one.told_ms + self._patience.given_up_ms, one.stirred_ms + self._patience.stuck_ms)

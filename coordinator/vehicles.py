@@ -138,9 +138,9 @@ class KnownVehicle:
     """One vehicle of the fleet.
 
     `heard_ms`: when its newest state was sent; `silent`: whether that is so long ago that it is offered nothing;
-    `lost`: so long that what it had is open again. `stirred_ms`: when the newest that told of another place or work
-    than the one before. `finished_ms`: when it had surveyed all, or was home or given up before; for a primary.
-    `ended_early`: its battery did not last for all of its survey.
+    `lost`: so long that what it had is open again. `stirred_ms`: when the newest word was sent that told of another
+    place or work than before, or of looks that were not known. `finished_ms`: when it had surveyed all, or was home or
+    given up before; for a primary. `ended_early`: its battery did not last for all of its survey.
     `refused`: strips that it has refused as they are; `gave_way`: strips that it was told to give back to let another
     pass, which it may be offered again. `failed_at`: where it has failed. `offers`: by number the newest offer of each
     strip. `asked_back`: the strip that it was last asked to give back, 0 for none, `asked_back_ms`: when;
@@ -177,6 +177,11 @@ class KnownVehicle:
     _surveyed_in: int | None = None
     _state_order: Order = _NONE_YET
     _task_orders: dict[int, Order] = field(default_factory=dict)
+
+    @property
+    def told_ms(self) -> int:
+        """When the newest word was sent that tells that it is at its survey: a state, or looks that were not known."""
+        return max(self.heard_ms, self.stirred_ms)
 
     @property
     def sailing(self) -> Sailing:
@@ -239,6 +244,12 @@ class KnownVehicle:
         elif self._surveyed_in != header.incarnation and stirs:  # given up too early, or started anew
             self.finished_ms = None
         return True
+
+    def note_looks(self, header: Header) -> None:
+        """Notes that it has told of looks that were not known: whoever sees the seabed goes on with its survey."""
+        self.stirred_ms = max(self.stirred_ms, header.sent_ms)
+        if self.is_given_up and self.finished_ms is not None and header.sent_ms > self.finished_ms:
+            self.finished_ms = None
 
     def give_up(self, now_ms: int) -> None:
         """The mission goes on as if it had surveyed all, until it says when it has."""

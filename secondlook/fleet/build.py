@@ -23,10 +23,9 @@ from secondlook.fleet.link import (
     channel_config,
     coordinator_platform,
     looks_within_ms_of,
-    lost_after_ms_of,
     modem_configs,
+    patience_of,
     platforms_of,
-    silent_after_ms_of,
 )
 from secondlook.fleet.nodes import CLOCK, COORDINATOR, OBSERVER, RECORDER, WORLD, NodeSpec, node_spec
 from secondlook.fleet.roster import endurance_ms_of, flows_of, reserve_ms_of, role_of, roster_vehicle, way_home_of
@@ -346,8 +345,7 @@ def _coordinator_config(scenario: Scenario) -> CoordinatorConfig:
         allocator=made(ALLOCATOR, scenario.coordinator.allocator),
         deadline_factor=scenario.mission.deadline_factor or math.inf,
         deadline_s=scenario.mission.deadline_s or math.inf,
-        silent_after_ms=silent_after_ms_of(scenario),
-        lost_after_ms=lost_after_ms_of(scenario),
+        patience=patience_of(scenario),
         answer_within_ms=answer_within_ms_of(scenario),
         looks_within_ms=looks_within_ms_of(scenario),
         ahead_ms=0 if scenario.link is None else answer_within_ms_of(scenario),

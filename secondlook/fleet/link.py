@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
 
-from coordinator.config import ANSWER_WITHIN_MS
+from coordinator.config import ANSWER_WITHIN_MS, Patience
 from modem.config import ModemConfig, PollTimes, cycle_ms_of
 from planner.types import Point
 from secondlook.scenario import SHIP, Link, Profile, Scenario, Sonar
@@ -123,15 +123,10 @@ def word_ms_of(scenario: Scenario) -> int:
     return 0 if times is None else times.cycle_ms * times.packets_a_word
 
 
-def silent_after_ms_of(scenario: Scenario) -> int:
-    """Age of a vehicle's state from which the coordinator offers it nothing."""
-    return max(round(scenario.coordinator.lost_after_s * 1000), SILENT_CYCLES * word_ms_of(scenario))
-
-
-def lost_after_ms_of(scenario: Scenario) -> int:
-    """Age of a vehicle's state from which the coordinator counts it as lost."""
-    silent_ms = silent_after_ms_of(scenario)
-    return silent_ms if scenario.link is None else max(silent_ms, OUT_OF_REACH_MS)
+def patience_of(scenario: Scenario) -> Patience:
+    """How long the coordinator waits for a vehicle."""
+    silent_ms = max(round(scenario.coordinator.lost_after_s * 1000), SILENT_CYCLES * word_ms_of(scenario))
+    return Patience(silent_ms, silent_ms if scenario.link is None else max(silent_ms, OUT_OF_REACH_MS))
 
 
 def answer_within_ms_of(scenario: Scenario) -> int:

@@ -21,11 +21,10 @@ from comms.said.messages import (
     Task,
     TaskAction,
 )
-from coordinator.fleet import GIVEN_UP_AFTER
 from planner.fleet_map import CLOSED
 from planner.risk import LevelArray
 from secondlook.errors import UserError
-from secondlook.fleet.link import ANSWER_CYCLES, SILENT_CYCLES, silent_after_ms_of, word_ms_of
+from secondlook.fleet.link import ANSWER_CYCLES, SILENT_CYCLES, patience_of, word_ms_of
 from secondlook.fleet.nodes import COORDINATOR
 from secondlook.recorded.mission import load_run
 from secondlook.storm.witness import SURVEYING, Violation, Witness, where
@@ -77,7 +76,7 @@ def _ends_in_time(flight: Flight, plan: TroublePlan, witness: Witness) -> Iterat
                     failed_s = max(failed_s, one.t_s)
             failed_s = max(failed_s, witness.stirred_s(name))  # over a link its word of that may be lost for minutes
             surveyed_s = max(surveyed_s, witness.ended_s(name))  # or its word that it has ended comes late
-    surveyed_s = max(surveyed_s, failed_s + GIVEN_UP_AFTER * silent_after_ms_of(plan.scenario) / 1000)
+    surveyed_s = max(surveyed_s, failed_s + patience_of(plan.scenario).stuck_ms / 1000)
     ends_s = mission.ends_s(surveyed_s + _heard_within_s(plan)) + END_WITHIN_S
     if overs[-1].t_s > ends_s + END_WITHIN_S:
         yield Violation("the mission ends", overs[-1].t_s, COORDINATOR, f"it was to be over by {ends_s:.0f} s")

@@ -14,8 +14,7 @@ from typing import Any
 from comms.lockstep.faults import STRUCK
 from comms.said.routing import modem_of
 from comms.said.topics import LOOK, MANEUVER, MANEUVER_STATUS, Topic
-from coordinator.fleet import GIVEN_UP_AFTER
-from secondlook.fleet.link import platforms_of, silent_after_ms_of
+from secondlook.fleet.link import patience_of, platforms_of
 from secondlook.fleet.nodes import COORDINATOR
 from secondlook.scenario import Scenario
 from secondlook.storm.fleets import survey_s
@@ -60,14 +59,14 @@ def _plan(scenario: Scenario, number: int, core: tuple[str, ...], heals_s: float
 
 def latest_heals_s(scenario: Scenario) -> float:
     """Until when a core must be healed: later it may have been given up, or is too late for the end."""
-    latest_s = _s(0.9 * GIVEN_UP_AFTER * silent_after_ms_of(scenario) / 1000)
+    latest_s = _s(0.9 * patience_of(scenario).given_up_ms / 1000)
     deadline_s = scenario.mission.deadline_s
     return latest_s if deadline_s is None else min(latest_s, _s(deadline_s / 2))
 
 
 def limit_s(scenario: Scenario, heals_s: float) -> float:
     """A mission whose core is healed at `heals_s` and that is not over by then never will be."""
-    lost_s = GIVEN_UP_AFTER * silent_after_ms_of(scenario) / 1000
+    lost_s = patience_of(scenario).stuck_ms / 1000
     # Whoever was started anew surveys from the beginning.
     return 2 * scenario.mission.ends_s(heals_s + 2 * survey_s(scenario) + lost_s) + 600
 

@@ -29,7 +29,6 @@ from comms.said.messages import (
 )
 from comms.said.tally import tally
 from coordinator.coordinator import Coordinator
-from coordinator.fleet import GIVEN_UP_AFTER
 from coordinator.ledger import WITH_A_VEHICLE
 from planner.risk import MOST_LEVELS, LevelArray
 from vehicle_agent.agent import Agent
@@ -205,7 +204,7 @@ class CoordinatorWitness:
     def woke(self, step: Step, now_ms: int) -> None:
         """Its wake-up has come."""
         for record in self.node.ledger.in_state(*WITH_A_VEHICLE) if self.node.has_begun else ():
-            heard_ms, lost_after_ms = self._heard_ms(record.vehicle), self.node.config.lost_after_ms
+            heard_ms, lost_after_ms = self._heard_ms(record.vehicle), self.node.config.patience.lost_ms
             # Of one that is lost a word about the strip may still come, which gives it back.
             if heard_ms is None or record.since_ms < heard_ms + lost_after_ms <= now_ms:
                 what = f"strip {record.strip.number} is still with {record.vehicle}, heard {_at(heard_ms)}"
@@ -222,11 +221,19 @@ class CoordinatorWitness:
         before = of_place.get(incarnation)
         if before is None or tile.version > before.version:
             of_place[incarnation] = tile
+            self._note_looks(received)
         else:
             self.noted.add(LATE_TILE if tile.version < before.version else TILE_AGAIN)
         if len(of_place) > 1:
             self.noted.add(TWO_STARTS)
         self._check_risk(received.vehicle, now_ms)
+
+    def _note_looks(self, received: Received) -> None:
+        """Whoever tells of looks goes on with its survey, if it has not said that this is over."""
+        vehicle, header = received.vehicle, received.header
+        state = self._states.get(vehicle)
+        if state is None or state[0].incarnation < header.incarnation or state[1].mode in SURVEYING:
+            self.stirred_s[vehicle] = max(self.stirred_s.get(vehicle, 0.0), header.sent_ms / 1000)
 
     def _hear_answer(self, received: Received, status: TaskStatus, now_ms: int) -> None:
         """Whoever has said last that it is at the strip that it was offered has it; a state may have said since that it
@@ -291,7 +298,7 @@ class CoordinatorWitness:
         if record is None or record.vehicle != name:
             where = "no strip" if record is None else f"with {record.vehicle or 'nobody'}"
             self._tell("an offer is in the books", now_ms, f"strip {number}, offered to {name}, is {where} there")
-        if heard_ms is None or now_ms - heard_ms >= self.node.config.silent_after_ms:
+        if heard_ms is None or now_ms - heard_ms >= self.node.config.patience.silent_ms:
             what = f"strip {number} is offered to {name}, which was heard {_at(heard_ms)}"
             self._tell("nothing is offered to the lost", now_ms, what)
 
@@ -303,7 +310,7 @@ class CoordinatorWitness:
             start = header.incarnation
             starts = [max(of) for of in tiles.values()] + [max(of) for of in hotspots.values()]
             newest = max(starts, default=start)
-            given_up = now_ms - header.sent_ms >= GIVEN_UP_AFTER * self.node.config.silent_after_ms
+            given_up = now_ms - header.sent_ms >= self.node.config.patience.given_up_ms
             if given_up or newest > start:  # which tells nothing of what the start before has told
                 continue
             tiles_come = tally(of[start].version for of in tiles.values() if start in of)

@@ -20,7 +20,7 @@ from comms.said.messages import (
 )
 from coordinator.ledger import NUMBERS_A_SECOND, WITH_A_VEHICLE
 from coordinator.mission_end import GOAL_REACHED
-from secondlook.fleet.link import answer_within_ms_of, lost_after_ms_of, silent_after_ms_of
+from secondlook.fleet.link import answer_within_ms_of, patience_of
 from secondlook.testing.flight import Flight, check_limit, fail_if, lives, reached
 
 _AT_WORK = (TaskState.ACCEPTED, TaskState.UNDER_WAY)
@@ -83,7 +83,9 @@ def _lost(flight: Flight, said: Received[StripStatus]) -> str | None:
         if at_it or working:
             signs_ms.append(one.header.sent_ms)
     end_ms = flight.heard.now_ms
-    if signs_ms and end_ms - max(signs_ms) <= lost_after_ms_of(flight.scenario) + answer_within_ms_of(flight.scenario):
+    if signs_ms and end_ms - max(signs_ms) <= patience_of(flight.scenario).lost_ms + answer_within_ms_of(
+        flight.scenario
+    ):
         return None
     last = f"last said at {max(signs_ms) / 1000:.3f} s that it is" if signs_ms else "never said that it is"
     at_the_end = f"is {status.state.value} with {vehicle} at the end, {end_ms / 1000:.3f} s"
@@ -237,7 +239,7 @@ def assert_never_assigned_to_lost(flight: Flight) -> None:
             sent_ms = [
                 said.header.sent_ms for due_ms, said in states if said.vehicle == one.vehicle and due_ms <= now_ms
             ]
-            if not sent_ms or now_ms - max(sent_ms) >= silent_after_ms_of(flight.scenario):
+            if not sent_ms or now_ms - max(sent_ms) >= patience_of(flight.scenario).silent_ms:
                 heard = f"had last heard of at {max(sent_ms) / 1000:.3f} s" if sent_ms else "had never heard of"
                 problems.append(
                     f"strip {task.strip} was given to {one.vehicle} at {_s(one)} s, which the coordinator {heard}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 
 from by_hand import FLEET, HELPER, PRIMARY, SECOND_HELPER, run_info, vehicle
+from coordinator_by_hand import PATIENCE
 from deliver import deliver
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -70,7 +71,7 @@ BEGINNING = [
 def test_the_coordinator(
     allocator: GreedyAllocator | NoAllocator, run: object, sensible: bool, mail: list[Letter]
 ) -> None:
-    node = OneNode(Coordinator(CoordinatorConfig(allocator, 1.05, 30_000, 30_000, 30, 150, 0.3, 0.2)), Role.COORDINATOR)
+    node = OneNode(Coordinator(CoordinatorConfig(allocator, 1.05, PATIENCE, 30, 150, 0.3, 0.2)), Role.COORDINATOR)
     deliver(node, [Letter("run", run, 1, None, 0), *(BEGINNING if sensible else []), *mail])
     strips: dict[int, StripStatus] = {}
     for one in node.said:
@@ -112,7 +113,7 @@ def test_a_repeated_or_late_word_changes_nothing(mail: list[Letter], again: list
     post = dated([Letter("run", RUNS[0], 1, None, 0), *BEGINNING, *mail])
     said = []
     for with_repeats in (False, True):
-        config = CoordinatorConfig(GreedyAllocator(), 1.05, 30_000, 30_000, 30, 150, 0.3, 0.2)
+        config = CoordinatorConfig(GreedyAllocator(), 1.05, PATIENCE, 30, 150, 0.3, 0.2)
         node = OneNode(Coordinator(config), Role.COORDINATOR)
         for place, (at_ms, one) in enumerate(post):
             node.wait_until(at_ms - 1)

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from by_hand import FLEET, HELPER, PRIMARY, run_info, vehicle
+from coordinator_by_hand import PATIENCE
 from sectors_by_hand import sector, whole
 
 from comms.said.announcement import Role, Vertex, Zone
@@ -29,7 +30,7 @@ from coordinator.vehicles import MOST_FAILURES, Offer
 from planner.dubins import Pose
 from planner.region import Region
 
-CONFIG = CoordinatorConfig(GreedyAllocator(), 1.05, 30_000, 30_000, 30, 400, 0.3, 0.2)
+CONFIG = CoordinatorConfig(GreedyAllocator(), 1.05, PATIENCE, 30, 400, 0.3, 0.2)
 LEVELS = np.zeros((60, 10), dtype=np.uint8)
 AHEAD = replace(CONFIG, ahead_ms=60_000)
 LEAVES = AgentState(Mode.RETURNING, 0, 0.1, 0, 122.5, 0, 0)
@@ -47,7 +48,7 @@ class Known:
 
     def __init__(self, config: CoordinatorConfig = CONFIG, keep_out: tuple[Zone, ...] = ()) -> None:
         run = replace(run_info(400, 400), keep_out=keep_out)
-        self.fleet = KnownFleet(run, config.silent_after_ms, config.lost_after_ms, 0)
+        self.fleet = KnownFleet(run, config.patience, 0)
         self.ledger = Ledger()
         self.briefing = briefing_of(config, self.fleet, self.ledger)
         self.sector = whole(self.fleet)
@@ -101,7 +102,7 @@ class TestTheTimeLeft:
 
 
 def test_the_deadline_hangs_on_the_last_of_several_primaries_and_is_not_known_until_all_are() -> None:
-    fleet = KnownFleet(run_info(400, 400, vehicles=(*FLEET, vehicle("other", Role.SURVEY))), 30_000, 30_000, 0)
+    fleet = KnownFleet(run_info(400, 400, vehicles=(*FLEET, vehicle("other", Role.SURVEY))), PATIENCE, 0)
     briefing = briefing_of(replace(CONFIG, deadline_s=9000.0), fleet)
     plan = Plan(1, (PlannedTrack(1, 0, 0, 0, 0, 400, False),), (), (), "")
     for name, end_ms, deadline_s in ((PRIMARY, 1_000_000, 9000.0), ("other", 2_000_000, 2100.0)):
@@ -113,7 +114,7 @@ def test_the_deadline_hangs_on_the_last_of_several_primaries_and_is_not_known_un
 
 def test_a_helper_s_battery_lasts_to_its_reserve_less_ten_seconds() -> None:
     entry = replace(vehicle(HELPER, Role.REVISIT), endurance_ms=1_000_000, reserve_ms=100_000)
-    fleet = KnownFleet(run_info(400, 400, vehicles=(FLEET[0], entry)), 30_000, 30_000, 0)
+    fleet = KnownFleet(run_info(400, 400, vehicles=(FLEET[0], entry)), PATIENCE, 0)
     state = AgentState(Mode.IDLE, 0, 0.5, 0, 122.5, 0, 0)
     fleet.vehicles[HELPER].hear_state(Header(HELPER, 0, 1, 50_000), state, 50_000)
     (helper,) = briefing_of(CONFIG, fleet).situation(60_000, whole(fleet)).helpers

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from coordinator_by_hand import PATIENCE
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -49,7 +50,7 @@ def test_of_a_map_without_a_cell_in_the_area_weights_are_as_they_were_told() -> 
 
 
 def test_where_nobody_says_otherwise_there_is_no_link_three_share_a_sector_and_none_keep_apart() -> None:
-    config = CoordinatorConfig(GreedyAllocator(), 1.05, 30_000, 30_000, 30, 400, 0.3, 0.2)
+    config = CoordinatorConfig(GreedyAllocator(), 1.05, PATIENCE, 30, 400, 0.3, 0.2)
     assert (config.looks_within_ms, config.ahead_ms) == (0, 0)
     assert (config.answer_within_ms, config.helpers_a_team) == (10_000, 3)
     assert (config.separation_m, config.across, config.contacts) == (0, True, False)

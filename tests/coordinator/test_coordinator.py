@@ -16,6 +16,7 @@ from coordinator_by_hand import (
     HOT_CELLS,
     OFFERED,
     OPEN,
+    PATIENCE,
     TWO_HELPERS,
     UNDER_WAY,
     Told,
@@ -418,7 +419,7 @@ class TestLateRepeatedAndReordered:
         assert told.states() == {1: ACCEPTED}
 
     def test_before_the_run_is_announced_it_listens_to_nobody(self) -> None:
-        config = CoordinatorConfig(GreedyAllocator(), 1.05, 30_000, 30_000, 30, 400, 0.3, 0.2)
+        config = CoordinatorConfig(GreedyAllocator(), 1.05, PATIENCE, 30, 400, 0.3, 0.2)
         told = Told(OneNode(Coordinator(config), Role.COORDINATOR))
         told.hotspot()
         told.state(HELPER, Mode.IDLE)

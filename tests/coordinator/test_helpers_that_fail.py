@@ -11,6 +11,7 @@ from coordinator_by_hand import (
     GRID,
     HOT,
     HOT_CELLS,
+    PATIENCE,
     TWO_HELPERS,
     Told,
     coordinator,
@@ -191,7 +192,7 @@ class TestOneThatSaysDone:
 
 class TestACoordinatorStartedAnew:
     def anew(self, at_s: int) -> Told:
-        config = CoordinatorConfig(GreedyAllocator(), 1.05, 30_000, 30_000, 30, 400, 0.3, 0.2)
+        config = CoordinatorConfig(GreedyAllocator(), 1.05, PATIENCE, 30, 400, 0.3, 0.2)
         return Told(OneNode(Coordinator(config), Role.COORDINATOR, now_ms=at_s * 1000))
 
     def begun(self, at_s: int) -> Told:

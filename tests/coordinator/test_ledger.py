@@ -6,6 +6,7 @@ from itertools import product
 
 import pytest
 from by_hand import run_info
+from coordinator_by_hand import PATIENCE
 from hypothesis import given
 from hypothesis import strategies as st
 from one_node import received
@@ -232,7 +233,7 @@ def test_whatever_is_asked_of_it_the_books_are_in_order(moves: list[tuple[int, S
 
 
 def test_a_coordinator_gives_numbers_from_a_thousand_for_each_second_on_that_it_was_started_after() -> None:
-    node = Coordinator(CoordinatorConfig(NoAllocator(), 1.05, 30_000, 30_000, 30, 400, 0.3, 0.2))
+    node = Coordinator(CoordinatorConfig(NoAllocator(), 1.05, PATIENCE, 30, 400, 0.3, 0.2))
     node.start(7_900)
     node.on_message(received("run", run_info()), 8_000)
     assert node.ledger.next_number == 7001

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from by_hand import PRIMARY, run_info, vehicle
-from coordinator_by_hand import coordinator
+from coordinator_by_hand import PATIENCE, coordinator
 from hypothesis import given
 from hypothesis import strategies as st
 from one_node import received
@@ -39,7 +39,7 @@ class Laid:
     """Two sectors with two helpers each, worth the same a metre."""
 
     def __init__(self, first: Window = SOUTH, second: Window = NORTH) -> None:
-        self.fleet = KnownFleet(run_info(400, 400, vehicles=FLEET), 30_000, 30_000, 0)
+        self.fleet = KnownFleet(run_info(400, 400, vehicles=FLEET), PATIENCE, 0)
         self.agenda = Agenda()
         self.south, self.north = sector(self.fleet, first, 0, *HELPERS[:2]), sector(self.fleet, second, 1, *HELPERS[2:])
         self.sectors = Sectors([self.south, self.north], self.fleet.map.grid, self.agenda)
@@ -209,7 +209,7 @@ class TestWhereSomethingMatters:
         )
         node = coordinator(fleet, idle=()).node.node
         assert isinstance(node, Coordinator)
-        known = KnownFleet(run_info(side_m, side_m, vehicles=fleet), 30_000, 30_000, 0)
+        known = KnownFleet(run_info(side_m, side_m, vehicles=fleet), PATIENCE, 0)
         assert len(_sectors(node.config, known, np.ones(known.map.grid.shape, dtype=np.bool_), 0.7)) == count
 
     def test_what_is_cut_is_what_the_news_touches(self) -> None:

@@ -29,13 +29,14 @@ from comms.said.messages import (
 )
 from coordinator.allocate.simple import GreedyAllocator
 from coordinator.allocate.situation import Allocator, Situation
-from coordinator.config import CoordinatorConfig
+from coordinator.config import CoordinatorConfig, Patience
 from coordinator.coordinator import Coordinator
 from planner.goal import Goal
 from planner.risk import to_levels
 from planner.tiles import tiles
 
 RUN = run_info(400, 400)
+PATIENCE = Patience(silent_ms=30_000, lost_ms=30_000)
 GRID = RUN.grid.spec  # 81 columns, 80 rows of 5 m
 TWO_HELPERS = (*FLEET, vehicle(SECOND_HELPER, Role.REVISIT))
 OPEN, OFFERED, ACCEPTED, UNDER_WAY, DONE, FAILED, WITHDRAWN, NEXT = StripState
@@ -186,8 +187,7 @@ def coordinator(
         allocator=allocator or GreedyAllocator(),
         deadline_factor=1.05 if deadline_s is None else math.inf,
         deadline_s=math.inf if deadline_s is None else deadline_s,
-        silent_after_ms=30_000,
-        lost_after_ms=lost_after_ms,
+        patience=Patience(silent_ms=30_000, lost_ms=lost_after_ms),
         min_strip_m=30,
         max_strip_m=max_strip_m,
         worth_risk=0.3,

@@ -8,14 +8,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 from by_hand import FLEET, HELPER, PRIMARY, run_info, vehicle
-from coordinator_by_hand import GRID, HOT, HOT_CELLS, box
+from coordinator_by_hand import GRID, HOT, HOT_CELLS, PATIENCE, box
 
 from comms.said.announcement import Role, RosterVehicle
 from comms.said.codec import Header
 from comms.said.messages import CoverageTile, Hotspot, HotspotState, Plan, PlannedTrack
 from coordinator.cut.window import Window
 from coordinator.expect.expectation import Expectation, ExpectedMap
-from coordinator.fleet import GIVEN_UP_AFTER, KnownFleet
+from coordinator.fleet import KnownFleet
 from planner.risk import to_levels
 from planner.tiles import tiles
 from planner.types import BoolArray, DetectionCurve
@@ -26,7 +26,6 @@ NONE = np.zeros(GRID.shape, dtype=np.bool_)
 UP = PlannedTrack(1, 200, 200, 0, 200, 400, False)
 AGAIN = replace(UP, number=2)
 HALF = DetectionCurve(np.array([0.0, 300.0]), np.array([0.5, 0.5]))
-LOST_MS = 30_000
 
 
 @dataclass
@@ -40,7 +39,7 @@ class Told:
     versions: int = 0
 
     def __post_init__(self) -> None:
-        self.fleet = KnownFleet(run_info(400, 400, vehicles=self.vehicles, rho=self.rho), LOST_MS, LOST_MS, 0)
+        self.fleet = KnownFleet(run_info(400, 400, vehicles=self.vehicles, rho=self.rho), PATIENCE, 0)
         self.expected = ExpectedMap(self.fleet, self.place, self.inside[self.place.cells], 0.7)
 
     def plan(self, *tracks: PlannedTrack, name: str = PRIMARY) -> None:
@@ -100,9 +99,9 @@ class TestTracksToCome:
     def test_a_primary_that_is_given_up_flies_no_more(self) -> None:
         told = Told()
         told.plan(UP)
-        told.fleet.find_lost(LOST_MS)
+        told.fleet.find_lost(PATIENCE.lost_ms)
         assert told.now().risk == pytest.approx(0.5)  # lost, but it may be flying
-        told.fleet.find_lost(GIVEN_UP_AFTER * LOST_MS)
+        told.fleet.find_lost(PATIENCE.given_up_ms)
         assert told.now().risk == pytest.approx(1.0)
 
     def test_what_lies_outside_the_area_is_not_to_be_looked_at(self) -> None:

@@ -84,8 +84,8 @@ class TestSlots:
     def test_the_coordinators_patience_follows_from_the_cycle(self) -> None:
         scenario = linked("link.reach_m=3000", "link.access=polled")
         config = build_fleet(scenario, record=False).specs["coordinator"].config
-        assert (config.answer_within_ms, config.silent_after_ms) == (5 * 23_000, 6 * 23_000)
-        assert config.lost_after_ms == 600_000
+        assert (config.answer_within_ms, config.patience.silent_ms) == (5 * 23_000, 6 * 23_000)
+        assert config.patience.lost_ms == 600_000
 
     def test_fewer_frames_make_slots_shorter(self) -> None:
         all_six = times_of("link.reach_m=1500", profile="micromodem-6")

@@ -24,11 +24,12 @@ def fly(
     bus: Bus = "local",
     processes: int | None = None,
     drive: Drive | None = None,
+    scenario: str = str(BRIEF),
 ) -> dict[str, Any]:
-    """The summary of the brief mission."""
+    """The summary of a mission, the brief one if none is named."""
     folder.mkdir(exist_ok=True)
     options = RunOptions(folder, bus=bus, processes=processes, record=False, drive=drive or Lockstep())
-    summary = run_mission(load_scenario(str(BRIEF), settings), options)
+    summary = run_mission(load_scenario(scenario, settings), options)
     assert json.loads((folder / "summary.json").read_text()) == summary
     return summary
 
@@ -109,3 +110,12 @@ def test_corrected_the_coordinators_map_is_nearer_to_the_vehicles_own(tmp_path: 
         assert seen is not None
         off.append(float(np.abs(known.risk - seen.risk).mean()))
     assert off[1] < 0.7 * off[0]
+
+
+def test_a_primary_that_is_hardly_heard_is_waited_for_to_the_end_of_its_survey(tmp_path: Path) -> None:
+    settings = ("link.profile=micromodem-0", "link.loss=0.8", "link.access=polled")
+    summary = fly(tmp_path, *settings, scenario="tellaro")
+    assert summary["time"]["mission_s"] > 1.05 * summary["time"]["primary_s"] > 3000
+    lines = map(json.loads, (tmp_path / "events.jsonl").read_text().splitlines())
+    reasons = {one["reason"] for one in lines if one["key"] == "coord/mission_over"}
+    assert reasons == {"1.05 times the last primary's end is reached, 16 strips are left"}

@@ -19,10 +19,9 @@ from typer.testing import CliRunner
 
 import secondlook
 from comms.said.messages import TaskAction
-from coordinator.fleet import GIVEN_UP_AFTER
 from secondlook.cli import app_for
 from secondlook.errors import UserError
-from secondlook.fleet.link import silent_after_ms_of
+from secondlook.fleet.link import patience_of
 from secondlook.scenario import Scenario, load_scenario
 from secondlook.scenario.bundled import link_names
 from secondlook.storm import campaign
@@ -62,7 +61,7 @@ def test_all_kinds_of_trouble_are_drawn_and_the_core_is_left_alone_in_time(drawn
             whom = {getattr(one, key, "") for key in ("node", "vehicle", "to", "platform")}
             if whom & set(plan.core) and one.what != "join":
                 assert ends_s <= plan.heals_s + 0.1, (number, one)
-        assert plan.heals_s <= GIVEN_UP_AFTER * silent_after_ms_of(plan.scenario) / 1000
+        assert plan.heals_s <= patience_of(plan.scenario).given_up_ms / 1000
     assert drawn == set(KINDS)
     assert 15 <= calm <= 50  # a tenth of 300
 

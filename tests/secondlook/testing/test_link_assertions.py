@@ -13,7 +13,7 @@ from flights import BRIEF
 from comms.lockstep.faults import FaultKind, Faults, MessageFault
 from comms.said.messages import Packet, Task, TaskAction
 from secondlook.errors import UserError
-from secondlook.fleet.link import silent_after_ms_of, word_ms_of
+from secondlook.fleet.link import patience_of, word_ms_of
 from secondlook.testing import (
     Fleet,
     Flight,
@@ -172,7 +172,7 @@ def test_what_must_hold_does_by_modem_too(by_modem: Flight) -> None:
 
 
 def test_who_is_not_heard_for_6_cycles_is_lost(by_modem: Flight) -> None:
-    assert silent_after_ms_of(by_modem.scenario) == max(30_000, 6 * word_ms_of(by_modem.scenario))
+    assert patience_of(by_modem.scenario).silent_ms == max(30_000, 6 * word_ms_of(by_modem.scenario))
     task = next(one for one in by_modem.said(Task) if one.message.action is TaskAction.TAKE)
     deaf = Faults(0, (MessageFault(FaultKind.DROP, "modem/ship/heard"),))
     with pytest.raises(AssertionError, match=f"strip {task.message.strip} was given to helper at .*never heard of"):
