@@ -6,9 +6,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations, product
 
 from planner.way_home import MARGIN_S
 from secondlook.fleet.build import build_fleet, vehicle_config, world_config
+from secondlook.fleet.link import ship_position
 from secondlook.fleet.survey_area import check_tracks, lays_tracks, region_of
 from secondlook.preflight.dry_survey import DrySurvey, Sea, fly_dry
 from secondlook.preflight.helpers import why_idle
@@ -140,7 +142,7 @@ def expected_mission(scenario: Scenario) -> MissionExpectation:
     # Where somebody may revisit strips are cut, and left open until then by those who can do nothing.
     latest_s = until_s if may_revisit else min(survey_s, until_s)
     refused, remarks = _flown_too_far(scenario, surveys, able, latest_s)
-    remarks += [*_surveyed_twice(scenario), *filter(None, [at_odds(scenario)])]
+    remarks += [*_surveyed_twice(scenario), *filter(None, [at_odds(scenario), _out_of_earshot(scenario)])]
     limit_s = mission.time_limit_s
     if survey_s <= limit_s < latest_s:
         remarks.append(
@@ -257,6 +259,24 @@ def _surveyed_twice(scenario: Scenario) -> Iterator[str]:
         if len(names) > 1:
             ground = "the whole area" if shares == 1 else f"share {share} of {shares}"
             yield f"{', '.join(names)}: each surveys {ground}; vehicles.ID.part gives each a share of its own"
+
+
+def _out_of_earshot(scenario: Scenario) -> str:
+    """Whether vehicles may be so far from the coordinator's platform that no modem is heard; nothing where they are
+    not."""
+    link, corners = scenario.link, scenario.area.polygon_m
+    if link is None or link.carried_by == "drivers":
+        return ""
+    ship = ship_position(scenario)
+    far_m = max(math.dist(*pair) for pair in (combinations(corners, 2) if ship is None else product([ship], corners)))
+    if far_m <= link.modem.max_range_m:
+        return ""
+    to_m = f"two vehicles in the area may be {far_m:.0f} m" if ship is None else f"the area reaches {far_m:.0f} m"
+    whom = "each other" if ship is None else "the ship"
+    return (
+        f"link.profile: a modem of {link.modem.name} is heard up to {link.modem.max_range_m:g} m away, and {to_m} from "
+        f"{whom}: who is farther off is not heard there"
+    )
 
 
 def _tracks(count: int) -> str:

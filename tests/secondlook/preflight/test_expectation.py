@@ -279,6 +279,11 @@ WALLS = f"area.keep_out_m={list(_RING)}"
             ["vehicles.helper.start={x_m: -4015, y_m: 50}"],
             "it needs 334 s or more to the area, and the mission is over after {latest_s:.0f} s at the latest",
         ),
+        (
+            # Its sonar's swath is 30 m: strips of 330 m might just fit.
+            ["coordinator.min_strip_m=331", "coordinator.max_strip_m=400"],
+            "a strip is 331 m long or longer (coordinator.min_strip_m), and in the area none is longer than 300 m",
+        ),
     ],
 )
 def test_a_helper_that_can_do_nothing_is_told_and_does_nothing(settings: list[str], why: str, tmp_path: Path) -> None:
@@ -333,6 +338,27 @@ def test_a_time_limit_between_the_surveys_end_and_the_deadline_is_remarked_on(tm
         "mission.time_limit_s: 3300 s ends the mission if strips are left then, as a failure; its deadline is after "
         f"about {math.ceil(expected.latest_s)} s"
     ]
+
+
+@pytest.mark.parametrize(
+    ("platform", "heard_m", "told"),
+    [
+        # The ship lies at -40, -20, in the middle of the starts, the farthest corner at 300, 100: 360.6 m away.
+        ("ship", 361, ""),
+        ("ship", 360, "the area reaches 361 m from the ship"),
+        ("primary", 317, ""),
+        ("primary", 310, "two vehicles in the area may be 316 m from each other"),
+    ],
+)
+def test_who_may_be_out_of_earshot_is_remarked_on(platform: str, heard_m: int, told: str) -> None:
+    profile = (
+        f"{{name: near, frame_bits: 256, rate_bps: 99, max_range_m: {heard_m}, loss: {{range_m: [0], share: [0]}}}}"
+    )
+    settings = [f"link.profile={profile}", f"coordinator.platform={platform}"]
+    expected = check_mission(BRIEF, settings)
+    heard = f"link.profile: a modem of near is heard up to {heard_m} m away, and {told}"
+    assert expected.warnings == ([f"{heard}: who is farther off is not heard there"] if told else [])
+    assert check_mission(BRIEF, [*settings, "link.carried_by=drivers"]).warnings == []
 
 
 def test_a_limit_cuts_what_is_told(tmp_path: Path) -> None:
