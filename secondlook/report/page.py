@@ -30,7 +30,7 @@ from secondlook.report.charts import histogram, risk_chart, risk_series, timelin
 from secondlook.report.drawing import LEVELS, Element, data_url, indexed_png, markup, palette
 from secondlook.report.link import link_report
 from secondlook.report.maps import STRIP_ON_MAP, are_many, flown_map, risk_map, strips_on_map, vehicle_classes
-from secondlook.report.words import degrees_by_place, fate, log_lines, moments, place_in_words
+from secondlook.report.words import degrees_by_place, fate, log_lines, moments, over_s, place_in_words
 from secondlook.scenario import load_scenario, scenario_hash
 from secondlook.scenario.bundled import scenario_names
 
@@ -131,6 +131,7 @@ def _flown(mission: RecordedMission) -> dict[str, Any]:
         "on_map": STRIP_ON_MAP,
         "many_strips": are_many(strips_on_map(mission.strips)),
         "moments": mattered,
+        "over_s": over_s(mission),
         "risk_chart": _at_both_widths(lambda width_px: risk_chart(series.samples, mattered, width_px)),
         "histogram": _at_both_widths(lambda width_px: histogram(before, after if helped else None, width_px)),
         "timeline": _at_both_widths(lambda width_px: timeline(vehicles, mission.helpers, done, width_px, classes)),

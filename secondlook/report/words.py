@@ -153,12 +153,12 @@ def _found(mission: RecordedMission) -> Iterator[Moment]:
 
 def _begun_and_done(mission: RecordedMission) -> Iterator[Moment]:
     primaries, helpers = set(mission.primaries), set(mission.helpers)
-    over_s = _over_s(mission)
+    ends_s = over_s(mission)
     for one in mission.activities:
         if one.mode is Mode.REVISIT and one.vehicle in helpers:
             helpers.remove(one.vehicle)
             yield Moment(one.begun_s, f"{one.vehicle} begins its first second look, at strip {one.works_on}")
-        if one.mode is Mode.FINISHED and one.vehicle in primaries and one.begun_s <= over_s:
+        if one.mode is Mode.FINISHED and one.vehicle in primaries and one.begun_s <= ends_s:
             primaries.remove(one.vehicle)
             yield Moment(one.begun_s, f"{one.vehicle} has finished the survey")
         if one.mode is Mode.RETURNING:
@@ -172,8 +172,8 @@ def _begun_and_done(mission: RecordedMission) -> Iterator[Moment]:
 
 def _warnings(mission: RecordedMission, log: Sequence[Line]) -> Iterator[Moment]:
     # What is given up because the mission is over went as planned.
-    over_s = _over_s(mission)
-    warnings = [line for line in log if line.warns and line.time_ms / 1000 <= over_s]
+    ends_s = over_s(mission)
+    warnings = [line for line in log if line.warns and line.time_ms / 1000 <= ends_s]
     for line in warnings[:MOST_WARNINGS]:
         yield Moment(line.time_ms / 1000, f"{line.sender}: {line.text}", warns=True)
     if len(warnings) > MOST_WARNINGS:
@@ -181,6 +181,7 @@ def _warnings(mission: RecordedMission, log: Sequence[Line]) -> Iterator[Moment]
         yield Moment(warnings[MOST_WARNINGS].time_ms / 1000, f"{rest} more warnings: see the log below", warns=True)
 
 
-def _over_s(mission: RecordedMission) -> float:
-    """When the mission was over; what is ended then is not finished."""
+def over_s(mission: RecordedMission) -> float:
+    """When the mission was over, or its last message, where nobody has said that it is. What is ended then is not
+    finished; over a link vehicles may hear of it minutes later."""
     return min((over.t_s for over in mission.said(MissionOver)), default=mission.end_s)

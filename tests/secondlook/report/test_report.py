@@ -190,6 +190,14 @@ def test_a_mission_without_a_helper_has_one_map(tmp_path: Path) -> None:
     assert "second looks" not in page.told
 
 
+def test_a_mission_took_as_long_as_it_went_on_not_until_the_last_has_heard_that_it_is_over(tmp_path: Path) -> None:
+    settings = ("link.profile=micromodem-0", "link.loss=0.8")
+    summary = run_mission(load_scenario(str(BRIEF), settings), RunOptions(tmp_path, bus="local"))
+    mission, over_s = secondlook.load(tmp_path), summary["time"]["mission_s"]
+    assert f"{mission.end_s / 60:.0f}" != f"{over_s / 60:.0f}"
+    assert f"All of it took {over_s / 60:.0f} minutes." in Page(report_page(mission)).told
+
+
 def test_the_command_writes_it_and_says_where(
     brief_copy: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
