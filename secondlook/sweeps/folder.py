@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
@@ -222,18 +222,32 @@ def read_rows(folder: Path, schema: pa.Schema | None = None) -> pa.Table:
         tables = [joined, *(one.filter(pc.invert(pc.is_in(one["key"], joined["key"]))) for one in tables)]
     if schema is None:
         schema = tables[-1].schema if tables else pa.schema({"key": TEXT, "seed": WHOLE})
-    try:
-        table = pa.concat_tables([schema.empty_table(), *tables], promote_options="permissive").select(schema.names)
-    except pa.ArrowException as error:
-        raise UserError(f"{folder}: the values that were varied before are of another kind: {error}") from error
-    places = _places(folder, table)
+    vary = read_made_with(folder).vary if tables else {}
+    alike = [schema.empty_table(), *(_alike(one, schema, vary) for one in tables)]
+    table = pa.concat_tables(alike, promote_options="default").select(schema.names)
+    places = _places(table, vary)
     return table.take(pc.sort_indices(places, [(name, "ascending") for name in places.column_names]))
 
 
-def _places(folder: Path, table: pa.Table) -> pa.Table:
+def _alike(table: pa.Table, schema: pa.Schema, vary: Mapping[str, Sequence[Any]]) -> pa.Table:
+    """A table with columns of the schema's kinds: where there were numbers alone, or nothing, there may be texts as
+    well now."""
+    for place, name in enumerate(table.column_names):
+        kind = schema.field(name).type if name in schema.names else None
+        if kind not in (None, table.schema.field(name).type):
+            # As the plan has them: 1 lies as 1.0 in a column that has 1.5, too.
+            told = {(type(one), one): one for one in vary.get(name, ()) if not isinstance(one, list | dict)}
+            told |= {(float, one): one for one in vary.get(name, ()) if type(one) is int}
+            cells = [told.get((type(one), one), one) for one in table[name].to_pylist()]
+            column = [as_cell(one) if kind == TEXT and one is not None else one for one in cells]
+            table = table.set_column(place, name, pa.array(column, kind))
+    return table
+
+
+def _places(table: pa.Table, vary: Mapping[str, Sequence[Any]]) -> pa.Table:
     """Of each row its seed, and the place of each of its values among those that the plan has."""
     places = {"seed": table["seed"]}
-    for key, values in read_made_with(folder).vary.items():
+    for key, values in vary.items():
         if key in table.column_names:  # of a table without rows nothing is known
             kind = table.schema.field(key).type
             cells = [as_cell(value) if kind == TEXT and value is not None else value for value in values]

@@ -180,10 +180,25 @@ class TestResumed:
         (command, *_) = read_rows(Path("out"))["command"].to_pylist()
         assert command.startswith(f"secondlook run {tmp_path}/bay.yaml --seed 1 --set ")
 
-    def test_a_number_may_be_followed_by_one_that_is_not_whole(self, tmp_path: Path) -> None:
-        fly(plan(vary={"vehicles.helper.speed_mps": [1, 2]}), tmp_path)
-        fly(plan(vary={"vehicles.helper.speed_mps": [1, 2, 2.5]}), tmp_path)
-        assert {*read_rows(tmp_path)["vehicles.helper.speed_mps"].to_pylist()} == {1.0, 2.0, 2.5}
+    @pytest.mark.parametrize(
+        ("key", "before", "more", "cells"),
+        [
+            ("vehicles.helper.speed_mps", [1, 2], [2.5], [1.0, 2.0, 2.5]),
+            ("mission.start_utc", [None], ["2026-01-01T00:00:00Z"], [None, "2026-01-01T00:00:00Z"]),
+            ("area.track_heading_deg", [0, 90], ["auto"], ["0", "90", "auto"]),
+            ("area.track_heading_deg", [0, 1.5], ["auto"], ["0", "1.5", "auto"]),
+            ("mission.deadline_s", [None], [300, 400], [None, 300, 400]),
+        ],
+    )
+    def test_values_may_be_followed_by_such_of_another_kind(
+        self, tmp_path: Path, key: str, before: list[Any], more: list[Any], cells: list[Any]
+    ) -> None:
+        fly(plan(vary={key: before}), tmp_path)
+        assert len(fly(plan(vary={key: [*before, *more]}), tmp_path).flown) == 8 * len(more)
+        found = load_sweep(tmp_path)
+        assert found.table[key].to_pylist() == cells * 8
+        assert [one.missions for one in standings(found, ["risk.mean"])] == [8] * len(cells)
+        assert fly(plan(vary={key: [*before, *more]}), tmp_path).flown == []
 
     def test_one_broken_off_while_its_rows_were_joined_has_none_twice(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, each_row_a_file: None
