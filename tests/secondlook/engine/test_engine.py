@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import pytest
@@ -212,6 +213,45 @@ class TestCode:
     def test_of_modules_those_of_the_users_that_have_a_source_file_are_told(self) -> None:
         assert code_of(["sys", "planner.types", "not.there", "numpy.random.mtrand"]) == {}
         assert code_of(["work"]).keys() == {"work"}
+
+    @pytest.mark.parametrize("place", ["", "lib/site-packages"])
+    @pytest.mark.parametrize(
+        ("changed", "counts"),
+        [
+            ("mine/own.py", True),
+            ("mine/__init__.py", True),
+            ("mine/below/deep.py", True),
+            ("mine/beside.py", True),
+            ("mine/other.py", False),
+            ("near.py", "not installed"),
+            ("elsewhere.py", False),
+        ],
+    )
+    def test_a_module_of_the_users_is_what_it_imports_of_the_same_place_too(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: str, changed: str, counts: bool | str
+    ) -> None:
+        files = {
+            "mine/__init__.py": "",
+            "mine/own.py": "import math, numpy, mine.beside\nfrom .below import deep\n",
+            "mine/below/__init__.py": "",
+            "mine/below/deep.py": "def late():\n    import near\n    from ..own import late\n",
+            "mine/beside.py": "no python at all",
+            "mine/other.py": "import elsewhere\n",
+            "near.py": "import near, not_there.at_all\n",
+            "elsewhere.py": "",
+        }
+        folder = tmp_path / place
+        for name, said in files.items():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_text(said)
+        module = ModuleType("mine.own")
+        module.__file__ = str(folder / "mine" / "own.py")
+        monkeypatch.setitem(sys.modules, "mine.own", module)
+        before = code_of(["mine.own"])
+        assert code_of(["mine.own"]) == before
+        (folder / changed).write_text("# other")
+        is_other = counts is True or (counts == "not installed" and not place)
+        assert (code_of(["mine.own"]) != before) == is_other
 
     def test_what_differs_is_named(self) -> None:
         here = code_here()
