@@ -165,7 +165,7 @@ class Traffic:
             sweep = self._sweep_from(pose_of(state), vehicle, strip)
             laid = self._over(vehicle, sweep.passes, entered=False)
             known = self._sweeps[entry.vehicle] = replace(known, sweep=sweep, course=laid)
-        elif stage == 2 and _is_carried_off(vehicle, known.course):
+        elif stage == 2 and _is_off(vehicle, known.course):
             passes = _left_of(known.sweep.passes, state)
             if passes:  # else it turns, and is on the next before long
                 known = replace(known, course=self._over(vehicle, passes, entered=True))
