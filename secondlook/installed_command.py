@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import gc
+import os
 import signal
 import sys
 from collections.abc import Iterator
@@ -47,6 +48,8 @@ def _all_kept() -> Iterator[None]:
 def main() -> None:
     """Checks the rooms, then runs the command line. Ctrl-C while that is still being loaded ends it without a word,
     standard output that cannot be written, and a full disk that nobody else has told of, with a sentence."""
+    if sys.stderr is None:  # closed by who has called us: nobody wants to read what is told there
+        sys.stderr = open(os.devnull, "w")  # noqa: SIM115
     try:
         check_rooms()
         with _ended_by_ctrl_c(), _all_kept():

@@ -9,7 +9,7 @@ import typer
 
 from secondlook.commands.given import Set
 from secondlook.commands.planned_survey import planned_surveys, unreachable
-from secondlook.commands.run import expected_of, refuse, tell_expected
+from secondlook.commands.run import expected_of, refuse, tell_expected, tracks_laid_in_time
 from secondlook.commands.scenarios import names_beginning_with
 from secondlook.errors import FAILED
 from secondlook.preflight.goal import goal_estimate
@@ -30,7 +30,8 @@ def check(
     cannot end within its limits is refused. One with a goal is flown with a few other seeds, to see whether it is
     reached."""
     valid = load_scenario(scenario, set_ or ())
-    surveys = planned_surveys(valid)
+    with tracks_laid_in_time():
+        surveys = planned_surveys(valid)
     across_m, along_m = valid.area.extent_m
     vehicles = ", ".join(f"{key} ({vehicle.role})" for key, vehicle in valid.vehicles.items())
     typer.echo(f"{scenario}: valid; {across_m:g} m by {along_m:g} m, {vehicles}")

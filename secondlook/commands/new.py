@@ -30,6 +30,7 @@ from secondlook.scenario.vehicle import RESERVED_IDS
 PATTERN = "headland"  # the bundled scenario whose keys and remarks are taken over
 WIDTH = 110
 CELLS_M = (5, 10, 20, 50, 100)
+LONGEST_S = 10_000_000  # a mission may take
 MOST_CELLS = 1_000_000  # of a map that is quick to compute with
 _NO_ID = re.compile(r"[^a-z0-9_-]+")
 
@@ -77,11 +78,15 @@ def scenario_of(chart: Chart, source: Path) -> tuple[str, Scenario]:
     cell_m = next((one for one in CELLS_M if _about_m2(chart.area) / one**2 <= MOST_CELLS), CELLS_M[-1])
     try:
         # Planned once to know how long it takes.
-        longest_s = max(one.takes_s for one in planned_surveys(_loaded(_text(chart, source, cell_m, 10_000_000))))
-        limit_s = max(20_000, math.ceil(1.5 * DEADLINE_FACTOR * longest_s / 1000) * 1000)
+        longest_s = max(one.takes_s for one in planned_surveys(_loaded(_text(chart, source, cell_m, LONGEST_S))))
+        limit_s = min(LONGEST_S, max(20_000, math.ceil(1.5 * DEADLINE_FACTOR * longest_s / 1000) * 1000))
         text = _text(chart, source, cell_m, limit_s)
         return text, _loaded(text)
     except ScenarioError as error:
+        if any(problem.text.startswith("area.cell_m") for problem in error.problems):
+            raise UserError(
+                f"{source}: the ground is less than {CELLS_M[0]} m across, too small to be surveyed"
+            ) from error
         told = "\n".join(f"{source}: {problem.text}" for problem in error.problems)
         raise UserError(told) from error
 

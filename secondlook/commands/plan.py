@@ -12,6 +12,7 @@ import typer
 from planner.spacing import TOLERANCE_M, adapt_range, track_offsets
 from secondlook.commands.given import AsJson, Set
 from secondlook.commands.planned_survey import plan_as_geojson, plan_as_json, plan_as_text, planned_surveys
+from secondlook.commands.run import tracks_laid_in_time
 from secondlook.errors import UserError
 from secondlook.scenario import load_scenario
 from secondlook.scenario.plug_ins import plug_ins_print_to_stderr
@@ -57,6 +58,7 @@ def plan(
 def _plan_scenario(name: str, settings: list[str], *, as_json: bool, as_geojson: bool) -> None:
     with plug_ins_print_to_stderr():
         scenario = load_scenario(name, settings)
+    with tracks_laid_in_time():
         surveys = planned_surveys(scenario)
     if as_json:
         typer.echo(json.dumps(plan_as_json(scenario, surveys)))

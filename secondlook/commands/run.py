@@ -204,14 +204,20 @@ def _tell_end(folder: Path, summary: dict[str, Any], failure: str, unreported: s
 
 def expected_of(mission: Scenario) -> MissionExpectation:
     """What a mission is expected to come to. Raises UserError for a spacing planner that does not come back."""
+    with tracks_laid_in_time():
+        return expected_mission(mission)
+
+
+@contextmanager
+def tracks_laid_in_time() -> Iterator[None]:
+    """Within it a spacing planner that does not come back raises UserError."""
     try:
         with Watchdog(PATIENCE_S) as watchdog, plug_ins_print_to_stderr():
             watchdog.begin("what lays the tracks")
-            expected = expected_mission(mission)
+            yield
             watchdog.end()
     except NoReturn as error:
         raise UserError(str(error)) from error
-    return expected
 
 
 def refuse(expected: MissionExpectation) -> None:

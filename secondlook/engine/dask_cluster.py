@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import logging
 from collections.abc import Iterator
@@ -10,6 +11,7 @@ from typing import Any
 
 import dask
 import distributed
+from distributed.deploy.spec import close_clusters
 
 from comms.errors import one_line
 from secondlook.engine.code_here import code_here, differing
@@ -29,20 +31,25 @@ def dask_cluster(address: str | None, jobs: int) -> Iterator[Engine]:
     Raises UserError where no scheduler answers or it has no worker, and where a worker has other code than this. A
     scheduler that is started anew is waited for; EngineError, if it does not come back.
     """
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # a worker that is lost is no matter here
+    for logger in ("distributed", "distributed.client"):  # a worker that is lost is no matter here
+        logging.getLogger(logger).setLevel(logging.CRITICAL)
     dask.config.set({"distributed.comm.timeouts.connect": f"{PATIENCE_S:g}s"})
     with ExitStack() as stack:
         at = address
         if at is None:
             dask.config.set(UNWATCHED)
-            cluster = distributed.LocalCluster(
-                n_workers=jobs,
-                threads_per_worker=1,
-                host="127.0.0.1",
-                dashboard_address=None,
-                memory_limit=0,
-                silence_logs=logging.CRITICAL,
-            )
+            try:
+                cluster = distributed.LocalCluster(
+                    n_workers=jobs,
+                    threads_per_worker=1,
+                    host="127.0.0.1",
+                    dashboard_address=None,
+                    memory_limit=0,
+                    silence_logs=logging.CRITICAL,
+                )
+            except BaseException:  # what is half made distributed cannot close as the interpreter ends
+                atexit.unregister(close_clusters)
+                raise
             at = stack.enter_context(cluster).scheduler_address
         try:
             client = stack.enter_context(distributed.Client(at, timeout=PATIENCE_S, set_as_default=False))

@@ -6,6 +6,7 @@ seconds, however short each is. A batch whose carrier is lost, a worker of a clu
 
 from __future__ import annotations
 
+import logging
 import os
 import socket
 import threading
@@ -23,9 +24,12 @@ from secondlook.engine.code_here import Code, code_here, differing
 from secondlook.engine.work_process import Lost, WorkProcess
 from secondlook.errors import UserError
 
+log = logging.getLogger("secondlook.engine")
+
 T = TypeVar("T")
 R = TypeVar("R")
 BATCH_S = 3.0  # of the wall clock
+LOOK_EVERY_S = 10.0  # whether there is somebody to work, where nothing is done
 MOST_IN_BATCH = 1000
 UNDER_WAY = 2  # batches a slot: one that is done, and one that waits for its end
 LEAST_LEFT = 4
@@ -104,19 +108,28 @@ class _Work(Generic[T, R]):
         self._lost = deque[_Batch[T]]()
         self._under_way: dict[Future[_Done], _Batch[T]] = {}
         self._piece_s: float | None = None  # of the latest batch
+        self._is_left = True  # somebody to work
 
     def done(self) -> Iterator[tuple[T, R | Lost]]:
         while True:
             self._send()
             if not self._under_way:
                 return
-            ended, _ = wait(self._under_way, return_when=FIRST_COMPLETED)
+            ended, _ = wait(self._under_way, timeout=LOOK_EVERY_S, return_when=FIRST_COMPLETED)
+            if not ended:
+                self._tell_if_nobody_works()
             for future in ended:
                 batch = self._under_way.pop(future)
                 for piece, answer in zip(batch.pieces, self._answers(future, batch), strict=False):
                     if isinstance(answer, _Raised):
                         raise answer.error
                     yield piece, answer
+
+    def _tell_if_nobody_works(self) -> None:
+        """Tells once that no worker is left; one may join."""
+        was_left, self._is_left = self._is_left, self._engine.slots() > 0
+        if was_left and not self._is_left:
+            log.warning("no worker is left; one is waited for")
 
     def _send(self) -> None:
         """Sends as many batches as keep all slots at work."""

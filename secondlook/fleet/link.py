@@ -10,7 +10,7 @@ from itertools import combinations
 from coordinator.config import ANSWER_WITHIN_MS, Patience
 from modem.config import ModemConfig, PollTimes, cycle_ms_of
 from planner.types import Point
-from secondlook.scenario import SHIP, Link, Profile, Scenario, Sonar
+from secondlook.scenario import SHIP, Link, Profile, Scenario, Sonar, ship_place
 from sim_world.acoustics import Water
 from sim_world.channel_config import ChannelConfig, LossTable, Outage, Signal, SonarEquation
 
@@ -84,10 +84,7 @@ def ship_position(scenario: Scenario) -> Point | None:
     """Where the ship lies, mission frame: as given, or in the middle of where the vehicles start; None with none."""
     if coordinator_platform(scenario) != SHIP:
         return None
-    if (given := scenario.coordinator.position) is not None:
-        return given.x_m, given.y_m
-    starts = [vehicle.start for vehicle in scenario.vehicles.values()]
-    return math.fsum(one.x_m for one in starts) / len(starts), math.fsum(one.y_m for one in starts) / len(starts)
+    return ship_place(scenario.coordinator.position, [vehicle.start for vehicle in scenario.vehicles.values()])
 
 
 def link_times(scenario: Scenario) -> LinkTimes | None:
@@ -127,6 +124,12 @@ def patience_of(scenario: Scenario) -> Patience:
     """How long the coordinator waits for a vehicle."""
     silent_ms = max(round(scenario.coordinator.lost_after_s * 1000), SILENT_CYCLES * word_ms_of(scenario))
     return Patience(silent_ms, silent_ms if scenario.link is None else max(silent_ms, OUT_OF_REACH_MS))
+
+
+def heard_within_ms_of(scenario: Scenario) -> int:
+    """By then a word has come across the water, and its answer, as far as any does; 0 where everybody hears
+    everybody."""
+    return (SILENT_CYCLES + ANSWER_CYCLES) * word_ms_of(scenario)
 
 
 def answer_within_ms_of(scenario: Scenario) -> int:

@@ -10,7 +10,7 @@ from itertools import combinations, product
 
 from planner.way_home import MARGIN_S
 from secondlook.fleet.build import build_fleet, vehicle_config, world_config
-from secondlook.fleet.link import ship_position
+from secondlook.fleet.link import heard_within_ms_of, ship_position
 from secondlook.fleet.survey_area import check_tracks, lays_tracks, region_of
 from secondlook.preflight.dry_survey import DrySurvey, Sea, fly_dry
 from secondlook.preflight.helpers import why_idle
@@ -135,7 +135,7 @@ def expected_mission(scenario: Scenario) -> MissionExpectation:
         for name, vehicle in scenario.vehicles.items()
         if not isinstance(vehicle, SurveyVehicle) or vehicle.revisits
     ]
-    until_s = mission.ends_s(survey_s)
+    until_s = mission.ends_s(survey_s + heard_within_ms_of(scenario) / 1000)  # of when the coordinator hears of its end
     reasons = {name: why_idle(scenario, name, begins_s.get(name, 0.0), until_s) for name in may_revisit}
     idle = {name: why for name, why in reasons.items() if why}
     able = [name for name in may_revisit if name not in idle]

@@ -16,6 +16,7 @@ from secondlook.scenario.model import (
     Scenario,
     UniformSeabed,
     scenario_hash,
+    ship_place,
 )
 from secondlook.scenario.odds import at_odds
 from secondlook.scenario.sensor import Curve, Estimate
@@ -70,4 +71,5 @@ __all__ = [
     "load_scenario",
     "make_scenario",
     "scenario_hash",
+    "ship_place",
 ]

@@ -36,7 +36,7 @@ from secondlook.scenario.values import (
     plug_in,
     refused,
 )
-from secondlook.scenario.vehicle import RevisitVehicle, SurveyVehicle, Vehicle, VehicleId, body_of
+from secondlook.scenario.vehicle import RevisitVehicle, Start, SurveyVehicle, Vehicle, VehicleId, body_of
 
 DEADLINE_FACTOR = 1.05
 MOST_TOLD = 5  # of what is missing
@@ -288,8 +288,9 @@ class Scenario(Mapping):
                 raise refused(f"must be {_listed(platforms)}", ("outages", number, "platform"))
         if vehicles:
             _check_modem(link, platforms, info.data.get("mission"))
-            if coordinator is not None and "area" in info.data:
-                _check_ship(link, coordinator, info.data["area"])
+            if ship and "area" in info.data:
+                given = None if coordinator is None else coordinator.position
+                _check_ship(link, given, [one.start for one in vehicles.values()], info.data["area"])
         return link
 
     @field_validator("current")
@@ -428,18 +429,24 @@ def _check_modem(link: Link, platforms: list[str], mission: Mission | None) -> N
         )
 
 
-def _check_ship(link: Link, coordinator: Coordinator, area: Area) -> None:
-    """Whether a ship that is given a place is heard anywhere in the area."""
-    if coordinator.position is None:
-        return
-    ship = shapely.Point(coordinator.position.x_m, coordinator.position.y_m)
-    apart_m, most_m = ship.distance(shapely.Polygon(area.polygon_m)), link.modem.max_range_m
+def _check_ship(link: Link, given: Position | None, starts: Sequence[Start], area: Area) -> None:
+    """Whether a ship is heard anywhere in the area."""
+    x_m, y_m = ship_place(given, starts)
+    apart_m, most_m = shapely.Point(x_m, y_m).distance(shapely.Polygon(area.polygon_m)), link.modem.max_range_m
     if apart_m > most_m:
+        left_out = "" if given is not None else "; left out, it is in the middle of where the vehicles start"
         raise refused(
             f"must be heard farther than {most_m:g} m, or coordinator.position lie nearer to the area, from which it "
-            f"is {apart_m:.0f} m away",
+            f"is {apart_m:.0f} m away{left_out}",
             ("profile",),
         )
+
+
+def ship_place(given: Position | None, starts: Sequence[Start]) -> tuple[float, float]:
+    """Where the ship lies, mission frame: as given, or in the middle of where the vehicles start."""
+    if given is not None:
+        return given.x_m, given.y_m
+    return math.fsum(one.x_m for one in starts) / len(starts), math.fsum(one.y_m for one in starts) / len(starts)
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -24,7 +24,7 @@ from comms.said.messages import (
 from planner.fleet_map import CLOSED
 from planner.risk import LevelArray
 from secondlook.errors import UserError
-from secondlook.fleet.link import ANSWER_CYCLES, SILENT_CYCLES, patience_of, word_ms_of
+from secondlook.fleet.link import heard_within_ms_of, patience_of
 from secondlook.fleet.nodes import COORDINATOR
 from secondlook.recorded.mission import load_run
 from secondlook.storm.witness import SURVEYING, Violation, Witness, where
@@ -40,7 +40,6 @@ from secondlook.testing.strip_assertions import (
 AGREE_WITHIN_S = 60.0  # after the core is healed: what is late by half a minute, the next report, and its answer
 END_WITHIN_S = 30.0  # of the deadline
 MOST_CALLED_BACK, WITHIN_S = 12, 60.0  # no more often in that time is a vehicle called back from where it was sent
-HEARD_CYCLES = SILENT_CYCLES + ANSWER_CYCLES  # of a link: a word has come by then, and its answer, as far as any does
 
 
 def check_flight(flight: Flight, plan: TroublePlan, witness: Witness) -> list[Violation]:
@@ -77,14 +76,9 @@ def _ends_in_time(flight: Flight, plan: TroublePlan, witness: Witness) -> Iterat
             failed_s = max(failed_s, witness.stirred_s(name))  # over a link its word of that may be lost for minutes
             surveyed_s = max(surveyed_s, witness.ended_s(name))  # or its word that it has ended comes late
     surveyed_s = max(surveyed_s, failed_s + patience_of(plan.scenario).stuck_ms / 1000)
-    ends_s = mission.ends_s(surveyed_s + _heard_within_s(plan)) + END_WITHIN_S
+    ends_s = mission.ends_s(surveyed_s + heard_within_ms_of(plan.scenario) / 1000) + END_WITHIN_S
     if overs[-1].t_s > ends_s + END_WITHIN_S:
         yield Violation("the mission ends", overs[-1].t_s, COORDINATOR, f"it was to be over by {ends_s:.0f} s")
-
-
-def _heard_within_s(plan: TroublePlan) -> float:
-    """How long it may take until a word has crossed the water, and its answer: 0 where everybody hears everybody."""
-    return HEARD_CYCLES * word_ms_of(plan.scenario) / 1000
 
 
 def _core_has_finished(flight: Flight, plan: TroublePlan, witness: Witness) -> Iterator[Violation]:
@@ -155,7 +149,7 @@ def _books_agree_with_agents(flight: Flight, plan: TroublePlan, witness: Witness
             offered = where.get(message.works_on) == one.vehicle
             if message.works_on == has or (offered and not has):
                 agreed_s[one.vehicle] = max(plan.heals_s, one.t_s)
-            elif one.t_s - before_s > AGREE_WITHIN_S + _heard_within_s(plan):
+            elif one.t_s - before_s > AGREE_WITHIN_S + heard_within_ms_of(plan.scenario) / 1000:
                 what = f"at strip {message.works_on} (0 for none), by the books at {has}, since {before_s:.3f} s"
                 yield Violation("books and agents agree", one.t_s, one.vehicle, what)
                 return

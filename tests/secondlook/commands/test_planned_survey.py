@@ -3,7 +3,13 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
+from pathlib import Path
 
+import pytest
+
+from secondlook import installed_command
 from secondlook.commands.planned_survey import planned_surveys, unreachable
 from secondlook.scenario import Scenario, load_scenario
 
@@ -89,3 +95,32 @@ def test_a_body_that_is_not_ours_has_to_keep_out_by_itself() -> None:
     foreign = load_scenario("tellaro", said)
     told = "helper: its body is not ours: it has to keep out of area.keep_out_m by itself"
     assert unreachable(foreign, planned_surveys(foreign)) == [told]
+
+
+@pytest.mark.parametrize("command", ["check", "plan"])
+def test_a_spacing_planner_that_does_not_come_back_is_not_waited_for(
+    command: str, users_folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (users_folder / "endless.py").write_text(
+        "from planner.spacing_planners import AdaptiveSpacing\n\n\n"
+        "class Endless(AdaptiveSpacing):\n"
+        "    def decide(self, *told, **more):\n"
+        "        while True:\n"
+        "            pass\n"
+    )
+    monkeypatch.setattr("secondlook.commands.run.PATIENCE_S", 0.3)
+    monkeypatch.setattr(
+        "sys.argv", ["secondlook", command, "tellaro", "--set", "vehicles.primary.spacing=endless:Endless"]
+    )
+    with pytest.raises(SystemExit) as ended:
+        installed_command.main()
+    assert ended.value.code == 2
+    assert capsys.readouterr().err.splitlines()[-1] == "what lays the tracks has not come back within 0.3 s"
+
+
+def test_with_standard_error_closed_a_command_does_its_work(tmp_path: Path) -> None:
+    program = "from secondlook.installed_command import main; main()"
+    line = f'exec "{sys.executable}" -P -c "{program}" check tellaro 2>&-'
+    done = subprocess.run(["sh", "-c", line], cwd=tmp_path, stdout=subprocess.PIPE, text=True, check=False, timeout=60)
+    assert done.returncode == 0
+    assert "the survey ends after about" in done.stdout

@@ -11,6 +11,7 @@ import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -172,6 +173,26 @@ class Carrier(Executor):
         return future
 
 
+class LateCarrier(Carrier):
+    """Calls what it is given when it is told to."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._given: list[tuple[Future[Any], Callable[[], Any]]] = []
+
+    def submit(self, function: Callable[..., Any], /, *arguments: Any, **keywords: Any) -> Future[Any]:
+        future = Future[Any]()
+        self._given.append((future, partial(function, *arguments, **keywords)))
+        return future
+
+    def do_all(self) -> int:
+        """Calls it; the number of workers that has."""
+        while self._given:
+            future, call = self._given.pop()
+            future.set_result(call())
+        return 1
+
+
 class TestBatches:
     def test_one_that_is_lost_on_its_way_is_carried_again(self) -> None:
         carrier = Carrier(loses=3)
@@ -180,6 +201,15 @@ class TestBatches:
     def test_one_that_is_lost_three_times_is_given_up(self) -> None:
         with pytest.raises(EngineError, match="what was handed out was lost 3 times: CancelledError"):
             all_of(Engine(Carrier(loses=100), lambda: 1), work.doubled)
+
+    def test_that_nobody_is_left_to_work_is_told_once_each_time(
+        self, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+    ) -> None:
+        monkeypatch.setattr(engine_module, "LOOK_EVERY_S", 0.001)
+        carrier, told = LateCarrier(), [1, 0, 1, 1, 1, 0, 1]
+        engine = Engine(carrier, lambda: told.pop(0) if told else carrier.do_all())
+        assert all_of(engine, work.doubled, range(4, 5)) == {4: 8}
+        assert caplog.messages == ["no worker is left; one is waited for"] * 2
 
     def test_an_executor_that_is_gone_is_told(self) -> None:
         executor = ThreadPoolExecutor(1)

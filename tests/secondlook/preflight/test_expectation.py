@@ -379,3 +379,14 @@ def test_of_a_large_fleet_batteries_that_are_alike_are_told_together() -> None:
     few = expected_mission(load_scenario(str(BRIEF)))
     few = replace(few, battery_left={f"v{number}": 0.75 if number == 3 else 0.5 for number in range(9)})
     assert few.sentences[-1].endswith("; battery left then: 8 vehicles 50%, v3 75%")
+
+
+def test_across_the_water_the_mission_is_over_later_as_the_end_of_the_survey_is_heard_late() -> None:
+    # A turn of rate 1 takes 7.8 s here, a cycle 3 of them; a word and its answer come within 11 cycles.
+    plain, linked = check_mission("tellaro"), check_mission("tellaro", ["link.profile=micromodem-1"])
+    late_s = 11 * 3 * 7.829
+    assert linked.survey_s == plain.survey_s
+    assert linked.latest_s == pytest.approx(1.05 * (plain.survey_s + late_s), abs=0.1)
+    assert linked.battery_left["helper"] < plain.battery_left["helper"]
+    absolute = ["mission.deadline_s=3300", "mission.deadline_factor=null"]
+    assert check_mission("tellaro", ["link.profile=micromodem-1", *absolute]).latest_s == 3300
