@@ -70,6 +70,8 @@ T = TypeVar("T")
 M = TypeVar("M", bound=Message)
 OnRead = Callable[[float], None]
 """Is told how often messages have been read so far: 1 stands for all of them once."""
+MESSAGES = frozenset(topic.message for topic in TOPICS)
+LONGEST_S = 1e300  # of which milliseconds are still a number
 MESSAGE_BYTES = 300
 """Takes as long to read as the rest of a message does, about."""
 TOLD_EVERY_BYTES = 500_000
@@ -96,7 +98,10 @@ class Mission(ABC):
         """The messages of some types, or of all if none is named, in the order of sending."""
 
     def said(self, kind: type[M], keys: str = "**") -> list[Received[M]]:
-        """The messages of one type, such as `comms.said.messages.Plan`, in the order of sending."""
+        """The messages of one type, such as `comms.said.messages.Plan`, in the order of sending. Raises UserError for
+        what is none."""
+        if kind not in MESSAGES:
+            raise UserError(f"{kind!r} is not allowed; must be a type of message, such as comms.said.messages.Plan")
         return cast("list[Received[M]]", list(self.received(kind, keys=keys)))
 
     @property
@@ -469,4 +474,4 @@ def _mapping(path: Path, parse: Any) -> Mapping[str, Any]:
 
 def _is_time(value: object) -> bool:
     """Whether it is a number of seconds of a mission."""
-    return isinstance(value, Real) and 0.0 <= float(value) * 1000 < math.inf
+    return isinstance(value, Real) and 0.0 <= cast(float, value) < LONGEST_S

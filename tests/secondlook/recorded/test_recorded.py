@@ -124,7 +124,13 @@ def test_the_risk_of_a_vehicle_that_is_not_there_is_refused(mission: RecordedMis
     assert not mission.risk(vehicles=[]).seen.any()
 
 
-@pytest.mark.parametrize("at_s", [math.nan, math.inf, -1.0, "60"])
+@pytest.mark.parametrize("kind", ["Plan", RecordedMission, None])
+def test_what_is_no_type_of_message_was_said_by_nobody(mission: RecordedMission, kind: Any) -> None:
+    with pytest.raises(UserError, match=r"is not allowed; must be a type of message, such as comms\.said"):
+        mission.said(kind)
+
+
+@pytest.mark.parametrize("at_s", [math.nan, math.inf, -1.0, "60", 10**400])
 def test_the_risk_at_no_time_is_refused(mission: RecordedMission, at_s: Any) -> None:
     with pytest.raises(UserError, match=r"^at_s: .* is not allowed; must be a finite number of seconds, 0 or more$"):
         mission.risk(at_s)
