@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from by_hand import run_info
-from coordinator_by_hand import TWO_HELPERS
+from coordinator_by_hand import PATIENCE, TWO_HELPERS
 from one_node import received
 from sectors_by_hand import sector
 
@@ -34,7 +34,7 @@ class Lives:
     """Strips of two sectors, and what becomes of them. An answer is waited for 25 s, if not told otherwise."""
 
     def __init__(self, *, answer_within_ms: int = 25_000, looks_within_ms: int = 0) -> None:
-        self.fleet = KnownFleet(run_info(400, 400, vehicles=TWO_HELPERS), 30_000, 30_000, 0)
+        self.fleet = KnownFleet(run_info(400, 400, vehicles=TWO_HELPERS), PATIENCE, 0)
         self.agenda, self.outbox, self.ledger = Agenda(), Outbox(), Ledger()
         self.inside: BoolArray = np.ones(self.fleet.map.grid.shape, dtype=np.bool_)
         self.west, self.east = sector(self.fleet, WEST, 0), sector(self.fleet, EAST, 1)
