@@ -262,7 +262,7 @@ def _surveyed_twice(scenario: Scenario) -> Iterator[str]:
 
 
 def _out_of_earshot(scenario: Scenario) -> str:
-    """Whether vehicles may be so far from the coordinator's platform that no modem is heard; nothing where they are
+    """That vehicles may be so far from the coordinator's platform that no modem is heard; nothing where they are
     not."""
     link, corners = scenario.link, scenario.area.polygon_m
     if link is None or link.carried_by == "drivers":

@@ -26,10 +26,10 @@ def why_idle(scenario: Scenario, name: str, from_s: float, until_s: float) -> st
         return "it revisits, but the mission is over when its survey is"
     if coordinator.node is None and coordinator.strips == "reacting" and coordinator.allocator == "none":
         return "coordinator.allocator is none, which gives strips to nobody"
-    swath_m = footprint_of(vehicle.sonar).reach.strip_width_m
     if coordinator.node is None and not coordinator.strips.startswith("lanes"):
         across_m, along_m = scenario.area.extent_m
         longest_m = max(across_m, along_m) if coordinator.across else along_m
+        swath_m = footprint_of(vehicle.sonar).reach.strip_width_m
         if longest_m + swath_m < coordinator.min_strip_m:  # what is cut is cut in cells
             return (
                 f"a strip is {coordinator.min_strip_m:g} m long or longer (coordinator.min_strip_m), and in the area "

@@ -235,12 +235,12 @@ def _alike(table: pa.Table, schema: pa.Schema, vary: Mapping[str, Sequence[Any]]
     for place, name in enumerate(table.column_names):
         kind = schema.field(name).type if name in schema.names else None
         if kind not in (None, table.schema.field(name).type):
-            # As the plan has them: 1 lies as 1.0 in a column that has 1.5, too.
-            told = {(type(one), one): one for one in vary.get(name, ()) if not isinstance(one, list | dict)}
-            told |= {(float, one): one for one in vary.get(name, ()) if type(one) is int}
-            cells = [told.get((type(one), one), one) for one in table[name].to_pylist()]
-            column = [as_cell(one) if kind == TEXT and one is not None else one for one in cells]
-            table = table.set_column(place, name, pa.array(column, kind))
+            cells = table[name].to_pylist()
+            if kind == TEXT:  # of numbers, as the plan has them: 1 lies as 1.0 in a column that has 1.5, too
+                numbers = [one for one in vary.get(name, ()) if isinstance(one, int | float)]
+                texts = {(type(one) is bool, one): as_cell(one) for one in numbers}
+                cells = [None if one is None else texts[type(one) is bool, one] for one in cells]
+            table = table.set_column(place, name, pa.array(cells, kind))
     return table
 
 
