@@ -19,6 +19,8 @@ ANSWER_WITHIN_MS = 10_000
 """Where everybody hears everybody."""
 GIVEN_UP_AFTER = 10
 """So many times as long as for a helper is waited for a primary, without which nobody surveys."""
+STUCK_AFTER = 50
+"""So many times as long over a link, where most of where a primary is said to be is reckoned, it may stand still."""
 
 
 def weights_over(grid: GridSpec, inside: BoolArray, priorities: Iterable[PriorityGround]) -> FloatArray:
@@ -52,9 +54,10 @@ class Patience:
     @property
     def stuck_ms(self) -> int:
         """For so long a primary that is heard may tell of no other place, work or ground before the same. It may hear
-        nothing, and then never surveys, though it says that it is there. Over a link most of where it is said to be is
-        reckoned, so that it may seem to stand still for as long as its words are lost."""
-        return GIVEN_UP_AFTER * self.lost_ms
+        nothing, and then never surveys, though it says that it is there. Over a link it may seem to stand still for as
+        long as its words are lost, the longer the seldomer it has its turn."""
+        longest_ms = min(STUCK_AFTER * self.silent_ms, GIVEN_UP_AFTER * self.lost_ms)
+        return max(self.given_up_ms, longest_ms)
 
 
 @dataclass(frozen=True)

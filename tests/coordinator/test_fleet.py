@@ -23,8 +23,10 @@ PATIENCE = Patience(silent_ms=30_000, lost_ms=90_000)
 def test_a_primary_is_waited_for_no_shorter_than_a_helper() -> None:
     for silent_ms, lost_ms, given_up_ms, stuck_ms in (
         (30_000, 30_000, 300_000, 300_000),  # where everybody hears everybody
-        (30_000, 600_000, 600_000, 6_000_000),
-        (120_000, 600_000, 1_200_000, 6_000_000),
+        (30_000, 600_000, 600_000, 1_500_000),
+        (100_000, 600_000, 1_000_000, 5_000_000),
+        (240_000, 600_000, 2_400_000, 6_000_000),
+        (700_000, 700_000, 7_000_000, 7_000_000),
     ):
         patience = Patience(silent_ms, lost_ms)
         assert (patience.given_up_ms, patience.stuck_ms) == (given_up_ms, stuck_ms)
