@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from copy import copy
 from typing import NamedTuple
 
 from comms.said.bits import BitReader
@@ -90,9 +89,9 @@ def _piece(
         if size < 0:
             raise WireError("a piece that goes on behind its frame")
     elif is_whole:  # it tells by itself where it ends
-        ahead = copy(reader)
-        letters.open(ahead, platform, now_ms)
-        size = reader.left - ahead.left
+        begin = reader.left
+        letters.skip(reader, platform, now_ms)
+        size, reader.left = begin - reader.left, begin
     else:
         size = reader.read(form.size_bits)
     piece = Piece(reader.read(size), size, last, is_whole)

@@ -19,7 +19,7 @@ from comms.said.bits import BitReader, BitWriter
 from comms.said.codec import LARGEST_INCARNATION, Header
 from comms.said.messages import Hotspot, Plan
 from comms.said.over_water import Around
-from comms.said.packing import get_message, put_message
+from comms.said.packing import get_message, put_message, skip_message
 from comms.said.topics import (
     CURVE,
     HOTSPOT,
@@ -106,6 +106,25 @@ class Letters:
     def open(self, reader: BitReader, platform: str, now_ms: int, count: int = 0) -> tuple[Topic | None, Said]:
         """Topic and message of a letter from a platform. `count`: of the letters of the same second that were opened
         before. Raises WireError where it is none."""
+        topic, key, header = self._read_head(reader, platform, now_ms, count)
+        message: Any = get_message(reader, self._read_type(reader, topic), self._around(header.sent_ms))
+        return topic, Said(key, header, message)
+
+    def skip(self, reader: BitReader, platform: str, now_ms: int) -> None:
+        """Reads on to a letter's end. Raises WireError where there is none."""
+        topic, _, header = self._read_head(reader, platform, now_ms, 0)
+        skip_message(reader, self._read_type(reader, topic), self._around(header.sent_ms))
+
+    def _read_type(self, reader: BitReader, topic: Topic | None) -> type[Any]:
+        """What a letter on a topic holds."""
+        if topic is not None:
+            return topic.message
+        if self.config.corrects and reader.read(1):
+            return Correction
+        return PlainTile if self.config.tells_tiles else Stretch
+
+    def _read_head(self, reader: BitReader, platform: str, now_ms: int, count: int) -> tuple[Topic | None, str, Header]:
+        """What a letter is about, under which key, and who has said it when."""
         is_short = self.config.is_small
         topic, incarnation = self.topic_of(reader, platform), reader.read_count(0)
         if incarnation > LARGEST_INCARNATION:
@@ -127,14 +146,9 @@ class Letters:
         number = sequence % (LARGEST_NUMBER + 1)
         if topic is not None and self._has_its_number(topic) and (number := reader.read_count(4)) > LARGEST_NUMBER:
             raise WireError(f"{number} is no number of a key")
-        of_map: type[Any] = PlainTile if self.config.tells_tiles else Stretch
-        if topic is None and self.config.corrects and reader.read(1):
-            of_map = Correction
-        message: Any = get_message(reader, of_map if topic is None else topic.message, self._around(sent_s * 1000))
         key = "" if topic is None else topic.key(vehicle=vehicle, number=number)
-        return topic, Said(
-            key, Header(COORDINATOR if by_coordinator else vehicle, incarnation, sequence, sent_s * 1000), message
-        )
+        sender = COORDINATOR if by_coordinator else vehicle
+        return topic, key, Header(sender, incarnation, sequence, sent_s * 1000)
 
     def as_it_crosses(self, message: M, now_ms: int) -> M:
         """A message, or a piece of a map, as rounded as it comes out of the water."""

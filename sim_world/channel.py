@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import logging
 import math
+from bisect import bisect_left, insort
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from comms.node import random_stream
@@ -31,8 +31,7 @@ class Arrival(NamedTuple):
     frames: tuple[bytes, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class _Reception:
+class _Reception(NamedTuple):
     """A packet on its way to one platform: which of its sender's it is, over what distance, when it was sent, and from
     when until when it is heard there."""
 
@@ -41,18 +40,18 @@ class _Reception:
     sent_ms: int
     sender: str
     receiver: str
-    count: int
+    number: int
     frames: tuple[bytes, ...]
     range_m: float
 
     @property
     def order(self) -> tuple[int, str, str, int]:
         """By their ends, whatever the order in which they were sent."""
-        return self.ends_ms, self.sender, self.receiver, self.count
+        return self.ends_ms, self.sender, self.receiver, self.number
 
-    def overlaps(self, begins_ms: int, ends_ms: int) -> bool:
-        """Whether any part of it is heard within that time."""
-        return self.begins_ms < ends_ms and begins_ms < self.ends_ms
+
+_Packet = tuple[int, int, str, int]
+"""Until when and from when it is on the water at a place, whose it is, and which of its sender's."""
 
 
 class Channel:
@@ -65,8 +64,8 @@ class Channel:
     def __init__(self, config: ChannelConfig, seed: int) -> None:
         self._config, self._seed = config, seed
         self._counts = dict.fromkeys(config.platforms, 0)
-        self._sent: dict[str, list[tuple[int, int]]] = {name: [] for name in config.platforms}
-        self._heard: dict[str, list[_Reception]] = {name: [] for name in config.platforms}
+        self._on_water: dict[str, list[_Packet]] = {name: [] for name in config.platforms}
+        """At each platform, sent there or heard, by their ends."""
         self._open: list[_Reception] = []
         self._on_deck: list[Arrival] = []
         self.dropped_frames = 0
@@ -98,7 +97,7 @@ class Channel:
         lasts_ms = signal.packet_ms(len(fitting))
         if any(one.silences and one.concerns(sender, sent_ms, sent_ms + 1) for one in self._config.outages):
             return  # one that begins later in the packet garbles it: until then it was on the water
-        self._sent[sender].append((sent_ms, sent_ms + lasts_ms))
+        insort(self._on_water[sender], (sent_ms + lasts_ms, sent_ms, sender, count))
         for receiver in self._config.platforms:
             range_m = math.dist(places[sender], places[receiver])
             if receiver != sender and range_m <= signal.max_range_m:
@@ -106,7 +105,7 @@ class Channel:
                 reception = _Reception(
                     begins_ms + lasts_ms, begins_ms, sent_ms, sender, receiver, count, fitting, range_m
                 )
-                self._heard[receiver].append(reception)
+                insort(self._on_water[receiver], (reception.ends_ms, begins_ms, sender, count))
                 if to in ("", receiver):
                     self._open.append(reception)
         self._forget(sent_ms)
@@ -122,15 +121,15 @@ class Channel:
         return on_deck + [Arrival(one.receiver, frames) for one in ended if (frames := self._came_through(one))]
 
     def _came_through(self, reception: _Reception) -> tuple[bytes, ...]:
-        begins_ms, ends_ms, receiver = reception.begins_ms, reception.ends_ms, reception.receiver
-        if any(begins_ms < until_ms and from_ms < ends_ms for from_ms, until_ms in self._sent[receiver]):
-            return ()
-        if any(one is not reception and one.overlaps(begins_ms, ends_ms) for one in self._heard[receiver]):
-            return ()
+        receiver, itself = reception.receiver, (reception.sender, reception.number)
+        there = self._on_water[receiver]
+        for _, begins_ms, sender, number in there[bisect_left(there, (reception.begins_ms + 1,)) :]:
+            if begins_ms < reception.ends_ms and (sender, number) != itself:
+                return ()
         lost = self._share_lost(reception)
         if lost == 0.0:
             return reception.frames
-        stream = random_stream(self._seed, "channel", reception.sender, receiver, str(reception.count))
+        stream = random_stream(self._seed, "channel", reception.sender, receiver, str(reception.number))
         drawn = stream.random(len(reception.frames))
         return tuple(frame for frame, chance in zip(reception.frames, drawn, strict=True) if chance >= lost)
 
@@ -159,6 +158,5 @@ class Channel:
         """Forgets what overlaps nothing that is still on its way, or that is told of late."""
         signal = self._config.signal
         since_ms = now_ms - signal.packet_ms(signal.frames) - LATEST_MS
-        for name in self._config.platforms:
-            self._heard[name] = [one for one in self._heard[name] if one.ends_ms > since_ms]
-            self._sent[name] = [one for one in self._sent[name] if one[1] > since_ms]
+        for there in self._on_water.values():
+            del there[: bisect_left(there, (since_ms + 1,))]

@@ -200,3 +200,9 @@ def get_message(reader: BitReader, message_type: type[M], around: Around) -> M:
     packing, record = _packing_of(message_type), record_of(message_type)
     message: M = record.decode(record.encode(message_type(**packing.get(reader, around, []))))
     return message
+
+
+def skip_message(reader: BitReader, message_type: type[Any], around: Around) -> None:
+    """Reads on to the end of a message that was put with the same `around`, whether or not it could be on the wire.
+    Raises WireError, and nothing else, where there is none of that type."""
+    _packing_of(message_type).get(reader, around, [])

@@ -35,7 +35,7 @@ from comms.said.messages import (
     TaskStatus,
 )
 from comms.said.over_water import Around
-from comms.said.packing import get_message, put_message
+from comms.said.packing import get_message, put_message, skip_message
 from comms.said.wire import LARGEST_MS, WireError
 from planner.types import DetectionCurve
 from secondlook.scenario import bundled
@@ -302,13 +302,19 @@ def test_any_message_is_packed_or_refused_with_a_wire_error(message_type: type[A
 
 
 def _is_got(packed: bytes, message_type: type[Any], around: Around = AROUND) -> bool:
-    """Whether a message is in these bytes, which then are what it is packed as; if not, a WireError says so."""
-    reader = BitReader(packed)
+    """Whether a message is in these bytes, which then are what it is packed as; if not, a WireError says so. Who reads
+    on to its end comes as far, or is told as much."""
+    reader, ahead = BitReader(packed), BitReader(packed)
+    try:
+        skip_message(ahead, message_type, around)
+    except WireError:
+        ahead.left = -1
     try:
         message = get_message(reader, message_type, around)
     except WireError:
         return False
     assert type(message) is message_type
+    assert ahead.left == reader.left
     first = f"{int.from_bytes(packed, 'big'):0{8 * len(packed)}b}"[: 8 * len(packed) - reader.left]
     assert _bits(message, around) == first
     return True
