@@ -41,6 +41,8 @@ class AuctionAllocator:
 
     def assign(self, situation: Situation) -> Mapping[str, int]:
         """See `Allocator`."""
+        if not situation.free:
+            return {}
         strips = sorted(situation.strips, key=lambda one: one.strip.number)
         bidders = [_Bidder(one, strips, situation.deadline_s) for one in situation.helpers]
         while bids := [bid for bidder in bidders if (bid := bidder.bid()) is not None]:

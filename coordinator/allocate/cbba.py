@@ -56,6 +56,8 @@ class CbbaAllocator:
 
     def assign(self, situation: Situation) -> Mapping[str, int]:
         """See `Allocator`."""
+        if not situation.free:
+            return {}
         strips = sorted(situation.strips, key=lambda one: one.strip.number)
         return {
             bidder.helper.vehicle: strips[bidder.path[0]].strip.number
