@@ -22,6 +22,8 @@ _ANGLE_TOLERANCE_RAD = 1e-10
 """A turn that is short of a full one by no more is none: rounding must not add a loop to a path."""
 _TOLERANCE = 1e-9
 """In turn radii: what differs by no more is decided by the order of the words, not by rounding."""
+_LEAST_HALF_RAD = 1e-20
+"""That stands for no turn where it is divided by."""
 TIE_M = 0.02
 """So much longer at most may the path be that first turns to port: of two that mirror each other, as to the line it
 came along, a pose that is told in centimetres and microradians must not decide, or others expect it on the other side.
@@ -91,15 +93,17 @@ def poses_along(paths: Sequence[DubinsPath], distances_m: FloatArray) -> FloatAr
     lengths_m, curvatures = np.array(
         [(m, turn / one.turn_radius_m) for one in paths for m, turn in zip(one.lengths_m, one.turns, strict=True)]
     ).T
-    ends_m = np.cumsum(lengths_m)
-    along_m = np.clip(distances_m, 0.0, ends_m[-1])
-    stretch = np.searchsorted(ends_m, along_m)
+    ends_m = lengths_m.cumsum()
+    along_m = np.minimum(np.maximum(distances_m, 0.0), ends_m[-1])
+    stretch = ends_m.searchsorted(along_m)
     x_m, y_m, heading_rad = starts.take(stretch, axis=0).T
     length_m = along_m - (ends_m - lengths_m).take(stretch)
     turned_rad = curvatures.take(stretch) * length_m
     # The chord of an arc, and of a straight stretch alike.
-    chord_m = length_m * np.sinc(turned_rad / _FULL_TURN_RAD)
-    chord_heading_rad = heading_rad + turned_rad / 2
+    half_rad = turned_rad / 2
+    chord_heading_rad = heading_rad + half_rad
+    half_rad[half_rad == 0.0] = _LEAST_HALF_RAD
+    chord_m = length_m * (np.sin(half_rad) / half_rad)
     poses = np.empty((along_m.size, 3))
     poses[:, 0] = x_m + chord_m * np.sin(chord_heading_rad)
     poses[:, 1] = y_m + chord_m * np.cos(chord_heading_rad)

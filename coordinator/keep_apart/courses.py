@@ -273,8 +273,9 @@ def too_close(
 
 def _nearest_m(apart: FloatArray) -> FloatArray:
     """The least distance within each step; `apart`, shape (n, 2): from one to the other, between the steps linear."""
-    begin, change = apart[:-1], np.diff(apart, axis=0)
+    begin, change = apart[:-1], apart[1:] - apart[:-1]
     square = np.einsum("ij,ij->i", change, change)
-    share = np.clip(-np.einsum("ij,ij->i", begin, change) / np.maximum(square, 1e-12), 0.0, 1.0)
+    share = -np.einsum("ij,ij->i", begin, change) / np.maximum(square, 1e-12)
+    share = np.minimum(np.maximum(share, 0.0), 1.0)
     nearest: FloatArray = np.hypot(*(begin + share[:, np.newaxis] * change).T)
     return nearest
