@@ -98,6 +98,7 @@ class Store:
                 _create(self.path, identity)
             opened.enter_context(_locked(self.path))
             self.past = _read_copy(self.path, identity)
+            self._is_empty = self.past is None
             self._steps = 0 if self.past is None else self.past.steps + len(self.past.journal)
             self._steps_file = opened.enter_context(Path(f"{self.path}{STEPS}").open("r+b", buffering=0))
             self._database = _connect(self.path)
@@ -112,6 +113,7 @@ class Store:
 
     def put(self, steps: int, state: bytes) -> None:
         """Puts a state in the place of the one before and of the journal. Raises NodeError."""
+        self._is_empty = False
         with self._as_failure(), self._database:
             self._database.execute("BEGIN IMMEDIATE")
             row = (steps, state, zlib.crc32(state, steps))
@@ -125,9 +127,13 @@ class Store:
             self._count(self._steps + 1)  # as if it were a step, which may be cut off as well
 
     def close(self) -> None:
-        """Closes the file."""
+        """Closes the file; of one in which nothing was ever remembered nothing is left."""
         with contextlib.suppress(sqlite3.Error):
             self._database.close()
+        if self._is_empty:
+            with contextlib.suppress(OSError):
+                for suffix in (WAL, STEPS, ""):
+                    Path(f"{self.path}{suffix}").unlink(missing_ok=True)
         self._files.close()
 
     def refuse(self, why: str) -> StoreRefusedError:
@@ -135,7 +141,7 @@ class Store:
         return _refused(self.path, why)
 
     def _count(self, steps: int) -> None:
-        self._steps = steps
+        self._steps, self._is_empty = steps, False
         os.pwrite(self._steps_file.fileno(), b"%020d\n" % steps, 0)  # all of it at once: of one length
 
     @contextmanager

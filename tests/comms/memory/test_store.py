@@ -57,11 +57,16 @@ def refusal(folder: Path, identity: Identity = OURS) -> str:
     return str(refused.value).removeprefix(f"{folder / 'alpha.sqlite'}: ")
 
 
-def test_a_new_one_holds_nothing_and_stays_so(tmp_path: Path) -> None:
-    for _ in range(2):
-        with opened(tmp_path / "made" / "for it") as store:
+def test_a_new_one_holds_nothing_and_leaves_nothing(tmp_path: Path) -> None:
+    folder = tmp_path / "made" / "for it"
+    for identity in (OURS, replace(OURS, seed="8")):
+        with opened(folder, identity) as store:
             assert store.past is None
-    assert store.path.stat().st_mode & 0o777 == 0o600
+            assert store.path.stat().st_mode & 0o777 == 0o600
+        assert not bytes_in(folder)
+    with opened(folder) as store:
+        store.put(0, b"a state before any step")
+    assert store.path.exists()
 
 
 @settings(max_examples=40, deadline=None)
@@ -102,8 +107,8 @@ def test_that_of_another_is_refused(tmp_path: Path, name: str) -> None:
 
 
 def test_of_another_seed_the_seed_is_told_although_the_scenario_is_another_by_it(tmp_path: Path) -> None:
-    with opened(tmp_path):
-        pass
+    with opened(tmp_path) as store:
+        remember(store, 1)
     said = refusal(tmp_path, replace(OURS, seed="8", scenario="f" * 64))
     assert said == "is of another seed, 1 and not 8; must be moved away, or another folder given"
 
