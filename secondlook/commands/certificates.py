@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ipaddress
-import os
 import re
 from collections.abc import Sequence
 from datetime import UTC, datetime
@@ -52,7 +51,7 @@ def certificates(
         )
     mission = load_scenario(scenario, set_ or ())
     nodes = _nodes(mission)
-    missing = [node for node in nodes if not (add and os.path.exists(out / f"{node}.pem"))]
+    missing = [node for node in nodes if not (add and _has_its_own(out, node))]
     hosts = _hosts(host or (), nodes, missing)
     if not missing:
         typer.echo(f"{out}: every node of {mission.name} has a certificate")
@@ -61,6 +60,16 @@ def certificates(
     end: datetime = import_module("secondlook.fleet.certificates").certify(out, hosts, datetime.now(UTC), days, add=add)
     typer.echo(f"{out}: certificates and keys of {', '.join(missing)}, valid until {end:%Y-%m-%d}")
     typer.echo("A host needs ca.pem and the two files of each of its nodes. Nobody needs ca.key but this command.")
+
+
+def _has_its_own(folder: Path, node: str) -> bool:
+    """Whether a node's certificate and key are there. Raises UserError where one of them is not, or holds nothing."""
+    pair = [folder / f"{node}{suffix}" for suffix in (".pem", ".key")]
+    sound = [file for file in pair if file.exists() and file.stat().st_size > 0]
+    if sound != pair and any(file.exists() for file in pair):
+        (lacking, *_) = (file for file in pair if file not in sound)
+        raise UserError(f"{lacking}: is missing or empty; {node} must have both its files or, for new ones, neither")
+    return bool(sound)
 
 
 def _nodes(mission: Scenario) -> list[str]:

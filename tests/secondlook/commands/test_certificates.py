@@ -169,20 +169,30 @@ def test_what_is_missing_is_added_by_the_same_authority_and_valid_no_longer(comm
     assert one.not_valid_after_utc == authority.not_valid_after_utc
 
 
-def test_where_one_file_cannot_be_written_none_is(command: Call) -> None:
+def test_where_half_a_pair_is_missing_nothing_is_written(command: Call) -> None:
     command(BRIEF, "--out", "own", *HERE)
     for name in ("world.pem", "world.key", "helper.pem"):
         Path("own", name).unlink()
     before = contents(Path("own"))
     assert command(BRIEF, "--out", "own", "--add") == (
-        2, "", "--out own/helper.key: File exists; must be a file that can be written\n"
+        2, "", "own/helper.pem: is missing or empty; helper must have both its files or, for new ones, neither\n"
     )  # fmt: skip
     assert contents(Path("own")) == before
 
 
+@pytest.mark.parametrize("name", ["router.key", "router.pem"])
+def test_an_empty_file_is_no_half_of_a_pair(command: Call, name: str) -> None:
+    command(BRIEF, "--out", "own", *HERE)
+    Path("own", name).write_bytes(b"")
+    assert command(BRIEF, "--out", "own", "--add") == (
+        2, "", f"own/{name}: is missing or empty; router must have both its files or, for new ones, neither\n"
+    )  # fmt: skip
+
+
 def test_a_host_of_one_that_has_its_certificate_is_refused(command: Call) -> None:
     command(BRIEF, "--out", "own", *HERE)
-    Path("own/world.pem").unlink()
+    for name in ("world.pem", "world.key"):
+        Path("own", name).unlink()
     assert command(BRIEF, "--out", "own", "--add", *HERE) == (
         2, "", "--host 127.0.0.1: router has its certificate already\n"
     )  # fmt: skip
@@ -197,7 +207,8 @@ NO_AUTHORITY = (
 @pytest.mark.parametrize(("file", "content"), [("ca.pem", "senseless"), ("ca.key", "senseless"), ("ca.key", None)])
 def test_an_authority_that_is_none_is_refused(command: Call, file: str, content: str | None) -> None:
     command(BRIEF, "--out", "own", *HERE)
-    Path("own/world.pem").unlink()
+    for name in ("world.pem", "world.key"):
+        Path("own", name).unlink()
     Path("own", file).write_text(content or Path("own/helper.key").read_text())
     assert command(BRIEF, "--out", "own", "--add") == (2, "", NO_AUTHORITY)
     Path("own", file).unlink()
