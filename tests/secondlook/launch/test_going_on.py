@@ -18,7 +18,7 @@ from flights import BRIEF, events, flight, has_ended, until
 from spread import SpreadFleet, kill, loopback_endpoint, lost_of_what_is_kept, spread_fleet
 
 from comms.drive import identity_of
-from comms.memory.store import Store
+from comms.memory.store import Entry, Store
 from comms.node import Received
 from comms.runner import Intake
 from comms.said.announcement import ClockMode
@@ -184,7 +184,9 @@ def test_what_is_not_ours_is_refused_before_anything_else(fleet: SpreadFleet) ->
 def test_a_memory_of_another_seed_is_refused_as_such(fleet: SpreadFleet) -> None:
     build = build_fleet(load_scenario(BRIEF, seed=7), record=True, mode=ClockMode.WALL)
     run = build.run_info.scenario
-    Store(fleet.folder / "state", "world", identity_of("world", run, build.run_info)).close()
+    store = Store(fleet.folder / "state", "world", identity_of("world", run, build.run_info))
+    store.add(Entry(0, 0, b"given", 0))
+    store.close()
     world = fleet.node("world", more=["--state", "state", "--seed", "8"])
     assert world.ends() == 2
     assert world.said == (
