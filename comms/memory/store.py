@@ -132,7 +132,7 @@ class Store:
             self._database.close()
         if self._is_empty:
             with contextlib.suppress(OSError):
-                for suffix in (WAL, STEPS, ""):
+                for suffix in (WAL, "", STEPS):  # a number without a file is no memory, and refuses nobody
                     Path(f"{self.path}{suffix}").unlink(missing_ok=True)
         self._files.close()
 

@@ -65,11 +65,10 @@ def certificates(
 def _has_its_own(folder: Path, node: str) -> bool:
     """Whether a node's certificate and key are there. Raises UserError where one of them is not, or holds nothing."""
     pair = [folder / f"{node}{suffix}" for suffix in (".pem", ".key")]
-    sound = [file for file in pair if file.exists() and file.stat().st_size > 0]
-    if sound != pair and any(file.exists() for file in pair):
-        (lacking, *_) = (file for file in pair if file not in sound)
-        raise UserError(f"{lacking}: is missing or empty; {node} must have both its files or, for new ones, neither")
-    return bool(sound)
+    lacking = [file for file in pair if not (file.exists() and file.stat().st_size)]
+    if lacking and any(file.exists() for file in pair):
+        raise UserError(f"{lacking[0]}: is missing or empty; {node} must have both its files or, for new ones, neither")
+    return not lacking
 
 
 def _nodes(mission: Scenario) -> list[str]:

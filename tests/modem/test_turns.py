@@ -82,9 +82,8 @@ def test_who_does_not_answer_is_passed_over_after_the_longest_answer_and_polled_
     waters.run(100_000)
     # Of beta nothing is heard for 3 s and 0.5 s, twice, and 0.4 s: 7.4 s. Alpha answers after 7 s.
     beta = [at_ms for at_ms, _ in spoke(waters, "beta")]
-    assert beta == [
-        one + 3500 for one in (7400, 21_800, 43_200, 64_600, 86_000)
-    ]  # after 1, 1 and then 2 polls of alpha
+    # After 1, 1 and then each 2 polls of alpha.
+    assert beta == [one + 3500 for one in (7400, 21_800, 43_200, 64_600, 86_000)]
     alpha = [at_ms - 3500 for at_ms, _ in spoke(waters, "alpha")]
     assert alpha == [400, 14_800, 29_200, 36_200, 50_600, 57_600, 72_000, 79_000, 93_400]
 
