@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import shapely
-from shapely.ops import split
 
 from planner.area import SurveyArea
 from planner.region import Region
@@ -91,27 +90,26 @@ class _Cutting:
     def _cut(self, polygon: shapely.Polygon) -> _Parts:
         if is_all_but_convex(polygon):
             return self._whole(polygon)
-        promising: list[tuple[_Cost, int, list[shapely.Polygon]]] = []
-        number = 0
-        for number, line in enumerate(_cuts(polygon, MANY_CORNERS if self._thorough else FEW_CORNERS)):
-            pieces = [piece for piece in _split(polygon, line) if piece.area > LEAST_PART_M2]
-            if len(pieces) > 1:
-                promising.append((_sum([self._whole(piece)[0] for piece in pieces]), number, pieces))
-        promising.sort(key=lambda one: one[:2])
+        cuts = _cuts(polygon, MANY_CORNERS if self._thorough else FEW_CORNERS)
+        divided = [pieces for pieces in _split(polygon, cuts) if len(pieces) > 1]
+        promising = sorted(divided, key=lambda pieces: _sum([self._cost(piece) for piece in pieces]))
         if not promising:  # no cut divides it
             return self._whole(polygon)
         found = []
-        for _, _, pieces in promising[: 2 if self._thorough and number < MOST_TO_BRANCH else 1]:
+        for pieces in promising[: 2 if self._thorough and len(cuts) <= MOST_TO_BRANCH else 1]:
             parts = [self.best(piece) for piece in pieces]
             found.append((_sum([cost for cost, _ in parts]), [piece for _, some in parts for piece in some]))
         return min(found, key=lambda one: one[0])
 
     def _whole(self, polygon: shapely.Polygon) -> _Parts:
         """Its convex hull as the only part."""
-        hull = _hull(polygon)
-        from_across_m, from_along_m, to_across_m, to_along_m = hull.bounds
+        return self._cost(polygon), [_hull(polygon)]
+
+    def _cost(self, polygon: shapely.Polygon) -> _Cost:
+        """What that costs."""
+        from_across_m, from_along_m, to_across_m, to_along_m = polygon.bounds
         tracks = self._tracks_for(to_across_m - from_across_m)
-        return (tracks, round(tracks * (to_along_m - from_along_m), 3)), [hull]
+        return tracks, round(tracks * (to_along_m - from_along_m), 3)
 
 
 def _sum(costs: list[_Cost]) -> _Cost:
@@ -124,9 +122,19 @@ def _hull(polygon: shapely.Polygon | shapely.MultiPolygon) -> shapely.Polygon:
     return hull
 
 
-def _split(polygon: shapely.Polygon, line: shapely.LineString) -> list[shapely.Polygon]:
-    pieces = shapely.get_parts(shapely.set_precision(shapely.get_parts(split(polygon, line)), GRID_M))
-    return [piece for piece in pieces if isinstance(piece, shapely.Polygon)]
+def _split(polygon: shapely.Polygon, lines: Sequence[shapely.LineString]) -> list[list[shapely.Polygon]]:
+    """What each of some lines cuts a polygon into, but for what is too small to be a part. All at once, as GEOS takes
+    less for a line than it takes to call it."""
+    nets = [shapely.polygonize(shapely.get_parts(one)) for one in shapely.union(polygon.boundary, lines)]
+    meshes, of_line = shapely.get_parts(np.array(nets, dtype=object), return_index=True)
+    shapely.prepare(polygon)
+    is_within = shapely.contains(polygon, shapely.point_on_surface(meshes))
+    pieces, of_mesh = shapely.get_parts(shapely.set_precision(meshes[is_within], GRID_M), return_index=True)
+    found: list[list[shapely.Polygon]] = [[] for _ in lines]
+    for number, piece, area_m2 in zip(of_line[is_within][of_mesh].tolist(), pieces, shapely.area(pieces), strict=True):
+        if area_m2 > LEAST_PART_M2:
+            found[number].append(piece)
+    return found
 
 
 def is_all_but_convex(polygon: shapely.Polygon | shapely.MultiPolygon) -> bool:
@@ -140,22 +148,31 @@ def _is_convex(polygon: shapely.Polygon | shapely.MultiPolygon) -> bool:
     return bool(_hull(polygon).area - polygon.area <= ON_A_LINE_M * polygon.length)
 
 
-def _cuts(polygon: shapely.Polygon, most_corners: int) -> Iterator[shapely.LineString]:
+def _cuts(polygon: shapely.Polygon, most_corners: int) -> list[shapely.LineString]:
     """Lines through each corner that points inward: right across the polygon, and as far as the next boundary only."""
     from_across_m, from_along_m, to_across_m, to_along_m = polygon.bounds
     reach_m = 2 * math.hypot(to_across_m - from_across_m, to_along_m - from_along_m)
-    for corner, one, other in _deepest(_inward_corners(polygon), polygon, most_corners):
-        for direction in (np.array([0.0, 1.0]), np.array([1.0, 0.0]), one, other):
-            along = direction / np.hypot(*direction) * reach_m
-            line = shapely.LineString([corner - along, corner + along])
-            chords = shapely.get_parts(polygon.intersection(line))
-            touching = [one for one in chords if one.distance(shapely.Point(corner)) < ON_A_LINE_M]
-            ends = shapely.get_coordinates(touching)
-            if len(touching) < len(chords) and len(ends) > 1:
-                places = (ends - corner) @ along / reach_m
-                reached = corner + np.outer([places.min() - BEYOND_M, places.max() + BEYOND_M], along / reach_m)
-                yield shapely.LineString(reached)
-            yield line
+    deepest = _deepest(_inward_corners(polygon), polygon, most_corners)
+    if not deepest:
+        return []
+    corners = np.repeat([corner for corner, _, _ in deepest], 4, axis=0)
+    directions = np.array([way for _, *sides in deepest for way in ((0.0, 1.0), (1.0, 0.0), *sides)])
+    directions /= np.hypot(*directions.T)[:, np.newaxis]
+    reach = directions * reach_m
+    lines = np.asarray(shapely.linestrings(np.stack([corners - reach, corners + reach], axis=1)))
+    chords, of_line = shapely.get_parts(shapely.intersection(polygon, lines), return_index=True)
+    is_touching = shapely.distance(chords, shapely.points(corners[of_line])) < ON_A_LINE_M
+    found = []
+    for number, line in enumerate(lines):
+        own = of_line == number
+        ends = shapely.get_coordinates(chords[own & is_touching])
+        if not is_touching[own].all() and len(ends) > 1:
+            along = directions[number]
+            places = (ends - corners[number]) @ along
+            reached = corners[number] + np.outer([places.min() - BEYOND_M, places.max() + BEYOND_M], along)
+            found.append(shapely.LineString(reached))
+        found.append(line)
+    return found
 
 
 def _inward_corners(polygon: shapely.Polygon) -> list[_Corner]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -144,7 +143,7 @@ class TestManyCorners:
         assert [500 - corner[1] for corner, _, _ in corners] == depths_m
         for most, kept in ((4, [90, 70, 60, 80]), (5, [50, 90, 70, 60, 80])):
             assert [500 - corner[1] for corner, _, _ in _deepest(corners, comb, most)] == kept
-        assert len(list(_cuts(comb, 4))) >= 4 * 4
+        assert len(_cuts(comb, 4)) >= 4 * 4
 
     @pytest.mark.parametrize(("thorough", "most"), [(True, 12), (False, 4)])
     def test_cuts_are_tried_through_twelve_or_of_a_search_that_is_not_thorough_through_four(
@@ -152,9 +151,9 @@ class TestManyCorners:
     ) -> None:
         tried, cuts = [], cutting._cuts
 
-        def told(polygon: shapely.Polygon, most_corners: int) -> Iterator[shapely.LineString]:
+        def told(polygon: shapely.Polygon, most_corners: int) -> list[shapely.LineString]:
             tried.append(most_corners)
-            yield from cuts(polygon, most_corners)
+            return cuts(polygon, most_corners)
 
         monkeypatch.setattr(cutting, "_cuts", told)
         convex_parts(Region(L_SHAPE), 0.0, tracks_of_30_m, thorough=thorough)
