@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+import shapely
 
 from planner.currents import Sailing
 from planner.dubins import Pose, path_lengths_m, shortest_path
@@ -75,11 +76,15 @@ class WayHome:
         """Whether it takes so much less than a time, by what is known without looking for the way, that nobody need
         look for it."""
         slowest_mps = self.sailing.slowest_mps
+        in_open_water_s = (math.dist(pose[:2], self.home) + MOST_RADII * self.turn_radius_m) / slowest_mps
         if not self.keep_out:
-            return (math.dist(pose[:2], self.home) + MOST_RADII * self.turn_radius_m) / slowest_mps < time_s
+            return in_open_water_s < time_s
+        circles_s = DETOUR * _FULL_TURN_RAD * self.turn_radius_m / slowest_mps
+        beeline = shapely.LineString([pose[:2], self.home])
+        if DETOUR * (in_open_water_s + circles_s) < time_s and self.keep_out.are_clear(beeline):
+            return True  # it takes no longer than in open water, which is sooner told
         about_s = float(self.times_s(np.array([pose], dtype=np.float64))[0])
-        circle_s = _FULL_TURN_RAD * self.turn_radius_m / slowest_mps
-        return DETOUR * (about_s + DETOUR * circle_s) < time_s
+        return DETOUR * (about_s + circles_s) < time_s
 
     def passes_within(self, pose: Pose, passes: Sequence[Pass], time_s: float) -> int:
         """How many passes, the first ones, can be flown in their order from a pose so that there is time to come home

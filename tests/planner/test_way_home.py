@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from planner.currents import FlowGrid, Sailing
@@ -113,6 +113,17 @@ class TestByHand:
         time_s = 3 * (about_s + 3 * 20 * math.pi / 1.5)
         assert not past_zones.is_well_within(pose, time_s)
         assert past_zones.is_well_within(pose, time_s + 0.01)
+
+    @given(st.floats(-250, 250), st.floats(-100, 15), st.floats(0, 6.28), st.floats(0.5, 3), st.floats(0.8, 1.2))
+    @example(250, 15, 0, 0.5, 0.95)
+    def test_what_is_well_within_past_zones_goes_by_about_how_long_it_takes(
+        self, x_m: float, y_m: float, heading_rad: float, radius_m: float, share: float
+    ) -> None:
+        home = WayHome((0.0, 100.0), Sailing(2.0, 0.8, EAST), radius_m, HEADLANDS)
+        about_s = float(home.times_s(np.array([[x_m, y_m, heading_rad]]))[0])
+        circle_s = 2 * math.pi * radius_m / home.sailing.slowest_mps
+        enough_s = 3 * (about_s + 3 * circle_s)
+        assert home.is_well_within(Pose(x_m, y_m, heading_rad), share * enough_s) == (share > 1)
 
     def test_many_at_once_are_as_one_by_one(self) -> None:
         poses = np.array([[40.0, 0.0, NORTH], [0.0, -100.0, SOUTH], [0.0, 0.0, EAST], [3.0, 4.0, EAST]])
