@@ -68,19 +68,20 @@ LOGS = "logs"
 class RunOptions:
     """`folder`: where the files of the run go; it exists. `drive`: what makes time go on, and what goes wrong on
     purpose; a node to which something is to happen has a process of its own. `processes`: see
-    `secondlook.fleet.nodes.hosts_of_run`. `record`: with recording and messages.mpk. `progress`: told the figures as
-    the mission goes on. `live_pipe`: where the recorder shows the mission while it runs, see
-    `viz.live_server.LiveServer`. `watch`: told each message in the order of sending; by raising `RunStopped` it ends
-    the run early, which is no failure. `made`: told each node that acts under its id, when it is made in this process,
-    again if it is started anew. `patience_s`: wall time after which a node that does not answer is given up. `outages`:
-    of the link, on purpose, beside those of the scenario; there are none without a link. `lasts`: whether the files
-    have to outlast a loss of power, for which each is waited for until it is on the disk."""
+    `secondlook.fleet.nodes.hosts_of_run`. `record`: with recording and messages.mpk. `events`: with events.jsonl.
+    `progress`: told the figures as the mission goes on. `live_pipe`: where the recorder shows the mission while it
+    runs, see `viz.live_server.LiveServer`. `watch`: told each message in the order of sending; by raising `RunStopped`
+    it ends the run early, which is no failure. `made`: told each node that acts under its id, when it is made in this
+    process, again if it is started anew. `patience_s`: wall time after which a node that does not answer is given up.
+    `outages`: of the link, on purpose, beside those of the scenario; there are none without a link. `lasts`: whether
+    the files have to outlast a loss of power, for which each is waited for until it is on the disk."""
 
     folder: Path
     bus: Bus = "zenoh"
     processes: int | None = None
     drive: Drive = field(default_factory=Lockstep)
     record: bool = True
+    events: bool = True
     progress: Progress | None = None
     live_pipe: Path | None = None
     watch: Watch | None = None
@@ -108,6 +109,7 @@ def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
         observer = Observer(
             options.folder,
             with_messages=options.record,
+            with_events=options.events,
             progress=options.progress,
             watch=options.watch,
             deck_ms=deck_ms_of(scenario.link),
@@ -142,13 +144,13 @@ def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
 def run_in_passing(
     scenario: Scenario, *, progress: Progress | None = None, watch: Watch | None = None
 ) -> dict[str, Any]:
-    """The same on the local bus without recording, its files in a folder that is gone afterwards. Raises RunFailedError
-    for all that keeps it from ending well, a full disk for one, or what nobody has foreseen: of many missions the
-    others are flown all the same."""
+    """The same on the local bus without recording, its few files in a folder that is gone afterwards. Raises
+    RunFailedError for all that keeps it from ending well, a full disk for one, or what nobody has foreseen: of many
+    missions the others are flown all the same."""
     try:
         with passing_folder() as folder:
-            options = RunOptions(folder, bus="local", record=False, progress=progress, watch=watch, lasts=False)
-            return run_mission(scenario, options)
+            few_files = RunOptions(folder, bus="local", record=False, events=False, lasts=False)
+            return run_mission(scenario, replace(few_files, progress=progress, watch=watch))
     except RunFailedError:
         raise
     except (UserError, OSError) as error:

@@ -35,11 +35,11 @@ class MissionFiles:
     CannotWriteError.
 
     `messages.mpk` is a stream of records as in `message_records`. `events.jsonl` has one JSON object a line: time, key
-    and fields.
+    and fields. Either may be left out.
     """
 
-    def __init__(self, folder: Path, *, with_messages: bool) -> None:
-        self._events = GrowingFile(folder / "events.jsonl")
+    def __init__(self, folder: Path, *, with_messages: bool, with_events: bool = True) -> None:
+        self._events = GrowingFile(folder / "events.jsonl") if with_events else None
         self._messages = GrowingFile(folder / "messages.mpk") if with_messages else None
         self._number = 0
         self._json = json.JSONEncoder(separators=(", ", ": "), check_circular=False, default=_plain).encode
@@ -59,14 +59,15 @@ class MissionFiles:
         if self._messages is not None:
             self._number += 1
             self._messages.write(record(self._number, received.key, received.payload))
-        if received.topic not in NOT_FOR_PEOPLE:
+        if self._events is not None and received.topic not in NOT_FOR_PEOPLE:
             event = {"t_s": received.t_s, "key": received.key, **_plain(received.message)}
             self._events.write(f"{self._json(event)}\n".encode())
 
     def close(self) -> None:
         """Ends both files, also where one of them cannot be written."""
         try:
-            self._events.close()
+            if self._events is not None:
+                self._events.close()
         finally:
             if self._messages is not None:
                 self._messages.close()

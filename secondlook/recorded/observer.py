@@ -26,7 +26,8 @@ class RunStopped(Stop):
 
 
 class Observer:
-    """A listener that writes messages.mpk, events.jsonl and at the end risk.npz into `folder`. Raises CannotWriteError.
+    """A listener that writes messages.mpk, events.jsonl, each if it is asked to, and at the end risk.npz into `folder`.
+    Raises CannotWriteError.
 
     `messages` counts them by topic. `progress` is told the figures every 10 simulated seconds. `watch` is told each
     message, last of all, and may raise RunStopped. `deck_ms`: what modems send before this does not cross the water.
@@ -38,6 +39,7 @@ class Observer:
         folder: Path,
         *,
         with_messages: bool,
+        with_events: bool = True,
         progress: Progress | None = None,
         watch: Watch | None = None,
         deck_ms: int = 0,
@@ -47,7 +49,7 @@ class Observer:
         self.link = LinkFigures(deck_ms)
         self.messages: Counter[str] = Counter()
         self._folder, self._lasts = folder, lasts
-        self._files = MissionFiles(folder, with_messages=with_messages)
+        self._files = MissionFiles(folder, with_messages=with_messages, with_events=with_events)
         self._progress = progress
         self._progress_due_ms = 0
         self._watch = watch

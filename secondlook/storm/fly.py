@@ -58,15 +58,21 @@ class _StormyFleet(Fleet):
 
 
 def fly_storm(plan: TroublePlan, *, bus: Bus = "local", folder: Path | None = None, record: bool = False) -> Outcome:
-    """Flies a storm. `folder`: where the files of the flight go; left out, they are gone afterwards."""
-    if folder is None:
-        with tempfile.TemporaryDirectory(prefix="secondlook-storm-") as passing:
-            return fly_storm(plan, bus=bus, folder=Path(passing), record=record)
+    """Flies a storm. `folder`: where the files of the flight go; left out, there are few, and they are gone
+    afterwards."""
+    if folder is not None:
+        return _flown(plan, bus, folder, record=record, events=True)
+    with tempfile.TemporaryDirectory(prefix="secondlook-storm-") as passing:
+        return _flown(plan, bus, Path(passing), record=record, events=False)
+
+
+def _flown(plan: TroublePlan, bus: Bus, folder: Path, *, record: bool, events: bool) -> Outcome:
     link = plan.scenario.link
     witness = Witness(may_rise=link is not None and link.maps == "corrected")
     flight: Flight | None = None
-    record = record or any(one.what == "disk_full" for one in plan.trouble)
-    fleet = _StormyFleet.of_plan(plan, folder=folder, bus=bus, record=record, made=witness.made)
+    fills_disk = any(one.what == "disk_full" for one in plan.trouble)
+    files = {"record": record or fills_disk, "events": events or fills_disk}
+    fleet = _StormyFleet.of_plan(plan, folder=folder, bus=bus, made=witness.made, **files)
     try:
         with witness.listening():
             flight = fleet.run()

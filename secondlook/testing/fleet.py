@@ -98,6 +98,7 @@ class Fleet(Trouble):
         bus: `local`, all in this process, or `zenoh`, a process for each node.
         processes: on `zenoh` alone, over how many processes the nodes are spread.
         record: with a recording, mission.rrd, and messages.mpk.
+        events: with events.jsonl, for people to read.
         fault_seed: decides which messages are struck by faults that have a probability.
         patience_s: wall time after which a node that does not answer is given up; `math.inf` to step through one.
         made: on `local`, told each node that acts under its id when it is made, again if it is started anew.
@@ -120,6 +121,7 @@ class Fleet(Trouble):
         bus: Bus = "local",
         processes: int | None = None,
         record: bool = False,
+        events: bool = True,
         fault_seed: int = 0,
         patience_s: float = PATIENCE_S,
         made: Made | None = None,
@@ -132,7 +134,7 @@ class Fleet(Trouble):
         self._processes = None if processes is None else _whole("processes", processes, 1)
         if processes is not None and bus == "local":
             raise UserError("processes: is not allowed on the bus local, where all is one process")
-        self._record = record
+        self._record, self._writes_events = record, events
         self._patience_s = patience_s
         self._made = made
         self._heard: Heard | None = None
@@ -225,6 +227,7 @@ class Fleet(Trouble):
                 bus,
                 self._processes,
                 record=self._record,
+                events=self._writes_events,
                 drive=Lockstep(faults, events),
                 watch=hear,
                 made=made,

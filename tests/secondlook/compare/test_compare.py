@@ -407,7 +407,7 @@ def test_of_two_at_once_into_one_folder_the_second_is_refused(command: Call, tmp
         env={**os.environ, "TMPDIR": str(tmp_path)},
     )
     try:
-        assert until(lambda: any(tmp_path.glob("*/secondlook-*/events.jsonl")), 60)
+        assert until(lambda: any(tmp_path.glob("*/secondlook-*/scenario.yaml")), 60)
         code, printed, err = command(str(BRIEF), "--seeds", "1", "--out", str(out))
     finally:
         first.send_signal(signal.SIGINT)
@@ -427,7 +427,7 @@ def test_ctrl_c_ends_it_with_a_sentence_and_leaves_no_process_and_no_file(tmp_pa
         start_new_session=True,
     )
     try:
-        assert until(lambda: any(tmp_path.glob("*/secondlook-*/events.jsonl")), 60)
+        assert until(lambda: any(tmp_path.glob("*/secondlook-*/scenario.yaml")), 60)
         os.killpg(process.pid, signal.SIGINT)
         _, err = process.communicate(timeout=30)
     finally:

@@ -68,6 +68,12 @@ class TestRun:
         assert (flight.risk().inside == risk["inside"]).all()
         assert flight.run.scenario == "brief"
 
+    def test_without_events_nothing_is_written_but_what_the_flight_has(self, brief: MakeFleet) -> None:
+        plain, few = brief().run(), brief(events=False).run()
+        assert few.digest == plain.digest
+        left_out = {one.name for one in plain.folder.iterdir()} - {one.name for one in few.folder.iterdir()}
+        assert left_out == {"events.jsonl"}
+
     def test_messages_are_typed_and_found_by_key(self, brief: MakeFleet) -> None:
         fleet = brief()
         flight = fleet.run()
