@@ -190,6 +190,7 @@ class Coordinator:
 
     def _hear_state(self, vehicle: KnownVehicle, header: Header, state: AgentState, now_ms: int) -> None:
         was_idle, was_finished, was_lost, before = vehicle.is_idle, vehicle.is_finished, vehicle.lost, vehicle.state
+        had_no_work = vehicle.has_no_work
         if not vehicle.hear_state(header, state, now_ms):
             return
         name = vehicle.entry.vehicle
@@ -204,7 +205,7 @@ class Coordinator:
                 self._agenda.add(Item.ASSIGN, now_ms, sector.number)
         same = before is not None and (before.mode, before.works_on) == (state.mode, state.works_on)
         self._dispatch.note_state(name, now_ms, does_another=not same)
-        self._strips.hear_state(vehicle, header, state, now_ms, was_idle=was_idle)
+        self._strips.hear_state(vehicle, header, state, now_ms, had_no_work=had_no_work)
         ahead_ms = self.config.ahead_ms
         if ahead_ms and vehicle.is_at_a_strip and state.expected_end_ms > 0 and self.ledger.next_of(name) is None:
             for sector in self._sectors.about(vehicle):  # it is to have its next by then

@@ -116,16 +116,16 @@ class StripLife:
             self.ask_back(strip, vehicle, now_ms)
 
     def hear_state(
-        self, vehicle: KnownVehicle, header: Header, state: AgentState, now_ms: int, *, was_idle: bool
+        self, vehicle: KnownVehicle, header: Header, state: AgentState, now_ms: int, *, had_no_work: bool
     ) -> None:
         """A vehicle's newest state tells of its work, too: an answer, or its last word on a strip, may be lost.
 
-        `was_idle`: whether it was idle by the state before.
+        `had_no_work`: whether it had none by the state before.
         """
         if vehicle.is_at_a_strip:
             if vehicle.hear_word_of(state.works_on, header):
                 self._hear_at_work(state.works_on, vehicle, header, now_ms, under_way=state.mode is Mode.REVISIT)
-        elif (was_idle and vehicle.is_idle) or state.mode.is_out_of_work:
+        elif (had_no_work and vehicle.has_no_work) or state.mode.is_out_of_work:
             self._hear_no_work(vehicle, header, now_ms)
 
     def hear_status(self, vehicle: KnownVehicle, header: Header, status: TaskStatus, now_ms: int) -> None:

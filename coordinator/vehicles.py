@@ -190,9 +190,15 @@ class KnownVehicle:
 
     @property
     def is_idle(self) -> bool:
-        """Whether it is there and without work; a primary that serves strips is so once it has surveyed all."""
+        """Whether it is there and without work."""
+        return not self.silent and self.has_no_work
+
+    @property
+    def has_no_work(self) -> bool:
+        """Whether its newest state says so, though it may be silent since; of a primary that serves strips once it has
+        surveyed all."""
         free = (Mode.IDLE, Mode.FINISHED) if self.entry.role is Role.SURVEY_REVISIT else (Mode.IDLE,)
-        return not self.silent and self.state is not None and self.state.mode in free
+        return self.state is not None and self.state.mode in free
 
     @property
     def is_at_a_strip(self) -> bool:

@@ -14,7 +14,7 @@ from comms.said.topics import COVERAGE, HEARD, STATE, Topic
 from modem.config import ModemConfig
 from modem.corrections import Correction
 from modem.layers import Layers
-from modem.letters import MOST_A_SECOND, Said
+from modem.letters import Said
 from modem.plain_tiles import PlainTile, told
 from modem.presence import REPORT_MS, Presence
 from modem.stretches import Stretch, Told
@@ -73,12 +73,15 @@ class ToldHere:
             self._say_tiles(platform, header, self._layers.hear(platform, header.incarnation, message))
 
     def reckon(self, platform: str, now_ms: int) -> None:
-        """Who is heard is there: its state as it is by now, where it was not told for a while."""
+        """Who is heard is there: its state as it is by now, where it was not told for a while.
+
+        It is newer than what has come, and no newer than what was said meanwhile and may still come.
+        """
         before = self._state_headers.get(platform)
         if before is None or now_ms - self._state_told_ms[platform] < REPORT_MS:
             return
         state = self._presences[platform].at(now_ms)
-        header = before._replace(sequence=now_ms // 1000 * MOST_A_SECOND, sent_ms=now_ms)
+        header = before._replace(sequence=self._newest.get(platform, before.newness)[1] + 1, sent_ms=now_ms)
         self.say(STATE.key(vehicle=platform), self._in_order(platform, header, now_ms), state)
 
     def _say_tiles(self, platform: str, header: Header, tiles: Iterable[Told]) -> None:

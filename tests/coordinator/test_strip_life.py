@@ -565,7 +565,7 @@ class TestWords:
         lives.forget()
         vehicle, state = lives.vehicle(HELPER), AgentState(Mode.TRANSIT, 1, 1, 0, 0, 0, 0)
         vehicle.hear_state(old, state, 0)
-        lives.life.hear_state(vehicle, old, state, 0, was_idle=False)
+        lives.life.hear_state(vehicle, old, state, 0, had_no_work=False)
         assert (lives.states(), lives.said()) == ([OPEN], [])
 
     @pytest.mark.parametrize(
@@ -1102,7 +1102,7 @@ class TestWhoHasNoWork:
         lives.tell(HELPER, 1, TaskState.ACCEPTED)
         vehicle, state = lives.vehicle(HELPER), AgentState(Mode.RETURNING, 0, 1, 0, 0, 0, 0)
         vehicle.hear_state(old, state, 0)
-        lives.life.hear_state(vehicle, old, state, 0, was_idle=False)
+        lives.life.hear_state(vehicle, old, state, 0, had_no_work=False)
         assert lives.states() == [ACCEPTED]
 
     def test_an_offer_that_it_has_not_answered_stays(self) -> None:

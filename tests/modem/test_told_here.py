@@ -6,8 +6,8 @@ import math
 
 from modems import RUN_INFO, config_of
 
-from comms.said.codec import Header
-from comms.said.messages import AgentState, Mode, TaskState, TaskStatus
+from comms.said.codec import Header, header_of
+from comms.said.messages import AgentState, Heard, Mode, TaskState, TaskStatus
 from comms.said.topics import STATE, TASK_STATUS
 from modem.layers import Layers
 from modem.letters import Said
@@ -46,3 +46,17 @@ def test_a_word_on_a_task_that_newer_ones_have_overtaken_tells_nothing_of_what_a
     done = presence.at(2_000)
     assert done is not None
     assert (done.mode, done.works_on) == (Mode.IDLE, 0)
+
+
+def test_a_state_that_was_reckoned_is_no_newer_than_a_word_that_was_said_before_and_comes_later() -> None:
+    config, beta = config_of("ship"), RUN_INFO.vehicles[1]
+    told = ToldHere(config, Layers(config, RUN_INFO), RUN_INFO.grid.spec, 0, {beta.vehicle: Presence(beta)})
+    key, state = STATE.key(vehicle=beta.vehicle), AgentState(Mode.IDLE, 0, 0.9, 0, 100.0, 0.0, math.pi)
+    told.hear(beta.vehicle, STATE, Said(key, Header(beta.vehicle, 0, 64, 1_000), state), 1_000)
+    word = Header(beta.vehicle, 0, 640, 10_000)
+    told.reckon(beta.vehicle, 12_000)
+    told.hear(beta.vehicle, TASK_STATUS, Said(key, word, TaskStatus(7, TaskState.ACCEPTED, 0.5, 0, "")), 13_000)
+    told.reckon(beta.vehicle, 24_000)
+    headers = [header_of(one.message.payload) for one in told.take() if isinstance(one.message, Heard)]
+    assert [one.sequence for one in headers] == [64, 65, 640, 641]
+    assert [one.sent_ms for one in headers] == [1_000, 12_000, 10_000, 24_000]

@@ -104,10 +104,10 @@ class Lives:
 
     def state(self, name: str, mode: Mode, works_on: int = 0, now_ms: int = 0) -> None:
         """A vehicle's state."""
-        vehicle, header, was_idle = self.vehicle(name), self.header(name, now_ms), self.vehicle(name).is_idle
+        vehicle, header, had_no_work = self.vehicle(name), self.header(name, now_ms), self.vehicle(name).has_no_work
         state = AgentState(mode, works_on, 1, 0, 0, 0, 0)
         assert vehicle.hear_state(header, state, now_ms)
-        self.life.hear_state(vehicle, header, state, now_ms, was_idle=was_idle)
+        self.life.hear_state(vehicle, header, state, now_ms, had_no_work=had_no_work)
 
     def sees(self, name: str, rows: Sequence[int] | range, level: int = 9) -> None:
         """A vehicle's layer, whole: it has seen all of these rows as well as that, and nothing else."""

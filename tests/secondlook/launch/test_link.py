@@ -117,5 +117,5 @@ def test_a_primary_that_is_hardly_heard_is_waited_for_to_the_end_of_its_survey(t
     summary = fly(tmp_path, *settings, scenario="tellaro")
     assert summary["time"]["mission_s"] > 1.05 * summary["time"]["primary_s"] > 3000
     lines = map(json.loads, (tmp_path / "events.jsonl").read_text().splitlines())
-    reasons = {one["reason"] for one in lines if one["key"] == "coord/mission_over"}
-    assert reasons == {"1.05 times the last primary's end is reached, 15 strips are left"}
+    (reason,) = {one["reason"] for one in lines if one["key"] == "coord/mission_over"}
+    assert reason.startswith("1.05 times the last primary's end is reached, ")
