@@ -95,7 +95,7 @@ class Polls:
         self._polled: str | None = None  # and has not answered
         self._place = -1
         self._silent = dict.fromkeys(self._others, 0)
-        self._passes = dict.fromkeys(self._others, 0)
+        self._passed_over = set[str]()  # when it is their turn next
 
     def begin(self, now_ms: int) -> None:
         """The water is free."""
@@ -113,15 +113,16 @@ class Polls:
         """The next in order that is not passed over."""
         if self._polled is not None:
             self._silent[self._polled] += 1
-            # Not seldomer: in a fleet of many a lost poll or two would have it count as lost.
-            self._passes[self._polled] = int(self._silent[self._polled] > 1)
+            if self._silent[self._polled] > 1:
+                # Not seldomer: in a fleet of many a lost poll or two would have it count as lost.
+                self._passed_over.add(self._polled)
         while True:
             self._place = (self._place + 1) % len(self._others)
             name = self._others[self._place]
-            if not self._passes[name]:
+            if name not in self._passed_over:
                 self._polled = name
                 return name
-            self._passes[name] -= 1
+            self._passed_over.remove(name)
 
     def has_spoken(self, now_ms: int, frames: int) -> None:
         """An answer has so much time as the longest takes."""
