@@ -59,7 +59,7 @@ class ToldHere:
             self._presences[platform].hear_state(message, header.incarnation, said.header.sent_ms)
         elif isinstance(message, TaskStatus):
             is_old = self._is_overtaken(platform, header)  # where it had to be said again
-            tells = not is_old and self._presences[platform].hear_status(message, now_ms)
+            tells = not is_old and self._presences[platform].hear_status(message, said.header.sent_ms)
             strip = self._presences[platform].strips.get(message.strip) if message.state is TaskState.DONE else None
             if tells:
                 self._newest[platform] = header.newness

@@ -49,7 +49,13 @@ def test_over_a_strip_it_goes_as_it_was_given() -> None:
     assert not presence.hear_status(status(TaskState.ACCEPTED), 15_000)
     going = presence.at(20_000)
     assert going is not None
-    assert (going.mode, going.works_on, place(presence, 20_000)) == (Mode.TRANSIT, 7, (100.0, 0.0))
+    assert (going.mode, going.works_on) == (Mode.TRANSIT, 7)
+    assert place(presence, 20_000) == pytest.approx((100.0, 20.0))
+    assert place(presence, 29_000) == pytest.approx((100.0, 38.0))  # on its run-in
+    on_strip = presence.at(60_000)  # before it says so
+    assert on_strip is not None
+    assert (on_strip.mode, on_strip.works_on) == (Mode.REVISIT, 7)
+    assert place(presence, 60_000) == pytest.approx((100.0, 100.0))
     # 30 m to the run-in, and with run-in and run-out 220 m, at 2 m/s.
     assert going.expected_end_ms == pytest.approx(10_000 + 125_000, abs=100)
     presence.hear_status(status(TaskState.UNDER_WAY), 40_000)
@@ -64,6 +70,58 @@ def test_over_a_strip_it_goes_as_it_was_given() -> None:
     assert done is not None
     assert (done.mode, done.works_on, done.expected_end_ms) == (Mode.IDLE, 0, 0)
     assert place(presence, 150_000) == pytest.approx((100.0, 250.0))
+
+
+def test_a_late_word_that_it_is_under_way_tells_by_its_end_since_when() -> None:
+    presence, under_way = Presence(BETA), replace(status(TaskState.UNDER_WAY), ends_ms=141_000)
+    presence.strips[7] = NORTH
+    presence.hear_state(IDLE, 0, 0)
+    presence.hear_status(status(TaskState.ACCEPTED), 10_000)
+    presence.hear_status(under_way, 95_000)
+    assert place(presence, 95_000) == pytest.approx((100.0, 148.0))  # 200 m take 100 s, so 54 s of them have passed
+    there = presence.at(95_000)
+    assert there is not None
+    assert there.expected_end_ms == 141_000
+    adrift = Presence(replace(BETA, drift_mps=0.2))  # which flies them in another time
+    adrift.strips[7] = NORTH
+    adrift.hear_state(IDLE, 0, 0)
+    adrift.hear_status(replace(status(TaskState.ACCEPTED), ends_ms=150_000), 10_000)
+    going = adrift.at(10_000)
+    assert going is not None
+    assert going.expected_end_ms == 150_000
+    adrift.hear_status(under_way, 95_000)
+    assert place(adrift, 95_000) == pytest.approx((100.0, 40.0))
+    slow = Presence(BETA)
+    slow.strips[7] = NORTH
+    slow.hear_state(IDLE, 0, 0)
+    slow.hear_status(status(TaskState.ACCEPTED), 10_000)
+    slow.hear_status(replace(under_way, ends_ms=400_000), 95_000)  # it has not begun later than it says so
+    assert place(slow, 95_000) == pytest.approx((100.0, 40.0))
+    assert place(slow, 105_000) == pytest.approx((100.0, 60.0))
+
+
+def test_it_goes_to_a_strip_from_where_it_says_that_it_is() -> None:
+    presence = Presence(BETA)
+    presence.strips[7] = NORTH
+    presence.hear_state(replace(IDLE, mode=Mode.TRANSIT, works_on=7, y_m=10.0), 0, 10_000)
+    assert place(presence, 15_000) == pytest.approx((100.0, 20.0))
+    presence.hear_state(replace(IDLE, mode=Mode.TRANSIT, works_on=7, x_m=120.0), 0, 20_000)  # it is elsewhere
+    assert place(presence, 20_000) == (120.0, 0.0)
+    assert place(presence, 900_000) == pytest.approx((100.0, 240.0))
+    presence.hear_state(replace(IDLE, mode=Mode.TRANSIT, works_on=8), 0, 30_000)  # a strip that nobody gave it here
+    assert place(presence, 90_000) == (100.0, 0.0)
+
+
+def test_where_words_do_not_tell_when_it_stands_still_until_it_is_heard_to_have_begun() -> None:
+    presence = Presence(BETA, on_its_way=False)
+    presence.strips[7] = NORTH
+    presence.hear_state(IDLE, 0, 0)
+    presence.hear_status(status(TaskState.ACCEPTED), 10_000)
+    going = presence.at(60_000)
+    assert going is not None
+    assert (going.mode, place(presence, 60_000)) == (Mode.TRANSIT, (100.0, 0.0))
+    presence.hear_status(status(TaskState.UNDER_WAY), 60_000)
+    assert place(presence, 70_000) == pytest.approx((100.0, 60.0))
 
 
 def test_a_word_on_another_strip_changes_nothing() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import pytest
 from modems import RUN_INFO, config_of
 
 from comms.said.codec import Header, header_of
@@ -13,6 +14,7 @@ from modem.layers import Layers
 from modem.letters import Said
 from modem.presence import Presence
 from modem.told_here import MOST_BESIDE, MOST_STARTS, ToldHere, layer_start
+from planner.types import Strip
 
 
 def test_the_layers_of_each_start_of_the_coordinators_modem_count_beside_those_before() -> None:
@@ -60,3 +62,18 @@ def test_a_state_that_was_reckoned_is_no_newer_than_a_word_that_was_said_before_
     headers = [header_of(one.message.payload) for one in told.take() if isinstance(one.message, Heard)]
     assert [one.sequence for one in headers] == [64, 65, 640, 641]
     assert [one.sent_ms for one in headers] == [1_000, 12_000, 10_000, 24_000]
+
+
+def test_what_a_word_tells_of_its_work_holds_since_it_was_said() -> None:
+    config, beta = config_of("ship"), RUN_INFO.vehicles[1]
+    presence, north = Presence(beta), Strip(7, (100.0, 40.0), 0.0, 200.0, 50.0)
+    presence.strips[7] = north
+    told = ToldHere(config, Layers(config, RUN_INFO), RUN_INFO.grid.spec, 0, {beta.vehicle: presence})
+    idle = AgentState(Mode.IDLE, 0, 0.9, 0, 100.0, 0.0, 0.0)
+    told.hear(beta.vehicle, STATE, Said(STATE.key(vehicle=beta.vehicle), Header(beta.vehicle, 0, 1, 0), idle), 0)
+    header, key = Header(beta.vehicle, 0, 640, 10_000), TASK_STATUS.key(vehicle=beta.vehicle, number=1)
+    told.hear(beta.vehicle, TASK_STATUS, Said(key, header, TaskStatus(7, TaskState.ACCEPTED, 0.0, 0, "")), 20_000)
+    going = presence.at(20_000)
+    assert going is not None
+    assert going.mode is Mode.TRANSIT
+    assert (going.x_m, going.y_m) == pytest.approx((100.0, 10 * beta.speed_mps))
