@@ -43,10 +43,9 @@ def shortest_way(start: Pose, end: Pose, turn_radius_m: float, keep_out: KeepOut
     Raises:
         ValueError: a number is not finite, or the turn radius not above 0.
     """
-    direct = shortest_path(start, end, turn_radius_m)
-    if not keep_out or keep_out.is_clear([direct]):
-        return (direct,)
-    return _way_round(start, end, turn_radius_m, keep_out)
+    if not keep_out:
+        return (shortest_path(start, end, turn_radius_m),)
+    return _way_past(start, end, turn_radius_m, keep_out)
 
 
 def way_or_direct(start: Pose, end: Pose, turn_radius_m: float, keep_out: KeepOut) -> Way:
@@ -56,15 +55,17 @@ def way_or_direct(start: Pose, end: Pose, turn_radius_m: float, keep_out: KeepOu
 
 
 @lru_cache(maxsize=20_000)
-def _way_round(start: Pose, end: Pose, turn_radius_m: float, keep_out: KeepOut) -> Way | None:
-    here, there = start[:2], end[:2]
+def _way_past(start: Pose, end: Pose, turn_radius_m: float, keep_out: KeepOut) -> Way | None:
+    direct, here, there = shortest_path(start, end, turn_radius_m), start[:2], end[:2]
+    if keep_out.is_clear([direct]):
+        return (direct,)
     if not keep_out.are_clear(shapely.points([here, there])).all() or keep_out.are_parted(here, there):
         return None
     # Of the paths that first turn to port and to starboard one may stay out where the other, as short, does not.
     to_sides = [shortest_path(start, end, turn_radius_m, (side,)) for side in (-1, 1)]
     least_m = min(path.length_m for path in to_sides)
     for path in to_sides:
-        if path.length_m <= least_m + TIE_M and keep_out.is_clear([path]):
+        if path != direct and path.length_m <= least_m + TIE_M and keep_out.is_clear([path]):
             return (path,)
     graph = _graph(keep_out, turn_radius_m)
     for first_m, last_m in sorted(
@@ -97,6 +98,7 @@ class _Graph:
     def __init__(self, keep_out: KeepOut, turn_radius_m: float) -> None:
         self._keep_out = keep_out
         self._radius_m = turn_radius_m
+        self._is_turn_clear = lru_cache(maxsize=20_000)(self._judged_turn)
         self._centres = _corner_circles(keep_out, turn_radius_m)
         count = len(self._centres)
         every = np.arange(2 * count)
@@ -198,9 +200,10 @@ class _Graph:
         if turned_rad * self._radius_m < _LEAST_M:
             return True
         x_m, y_m = _on_circle(centres, place, from_rad, self._radius_m)
-        pose = Pose(x_m, y_m, math.pi / 2 - from_rad)
-        lengths_m = (turned_rad * self._radius_m, 0.0, 0.0)
-        return self._keep_out.is_clear([DubinsPath(pose, self._radius_m, (_side(place), 0, 0), lengths_m)])
+        return self._is_turn_clear(Pose(x_m, y_m, math.pi / 2 - from_rad), _side(place), turned_rad * self._radius_m)
+
+    def _judged_turn(self, pose: Pose, side: int, length_m: float) -> bool:
+        return self._keep_out.is_clear([DubinsPath(pose, self._radius_m, (side, 0, 0), (length_m, 0.0, 0.0))])
 
     def _joined(self, centres: FloatArray, starts: np.ndarray, ends: np.ndarray) -> _Lines:
         """All lines from some circles to others that stay out."""

@@ -3,8 +3,9 @@ many from many places at once."""
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +15,12 @@ from planner.dubins import TIE_M, Pose
 from planner.keep_out import NOWHERE, KeepOut
 from planner.rounding import rounded
 from planner.sweep import NoSweepError, Sweep, shortest_sweep, sweeps_over
-from planner.types import FloatArray, Strip
+from planner.types import FloatArray, Point, Strip
+from planner.way_home import WayHome
 from planner.ways import way_lengths_m, way_or_direct
+
+MOST_KEPT = 64
+"""Of what was worked out last so much is kept: mostly it is asked for again."""
 
 
 @dataclass(frozen=True)
@@ -88,20 +93,25 @@ def removed_m2(one: OpenStrip, helper: Helper, served: Service, deadline_s: floa
     return helper.p_detect * one.risk_m2 * served.share_by(deadline_s)
 
 
+_Shortest = tuple[FloatArray, NDArray[np.intp]]
+
+
 class StripWays:
     """How helpers fly some strips that fly alike, each in several ways; of a strip that has fewer the last is repeated.
-    All arrays have shape (strips, ways), poses a third axis of 3.
+    All arrays have shape (strips, ways), poses a third axis of 3; nobody is to change them.
 
     `entry`, `leave`: the poses in which a way is begun, before its run-in, and left, behind its run-out. `sonar_on_s`:
     from when the sonar goes on until all is seen; `run_out_s`: from then until the helper is free.
     """
 
-    def __init__(self, strips: Sequence[OpenStrip], helper: Helper) -> None:
-        ways = [sweeps(one.strip, helper) for one in strips]
+    def __init__(self, strips: Sequence[Strip], helper: Helper) -> None:
+        ways = [sweeps(one, helper) for one in strips]
         most = max(map(len, ways), default=1)
         filled = [way + way[-1:] * (most - len(way)) for way in ways]
         shape = (len(strips), most)
         self._helper = helper
+        self._home_s = dict[WayHome | None, FloatArray]()
+        self._shortest = dict[bytes, _Shortest]()
         self.entry = np.array([one.entry for way in filled for one in way], dtype=np.float64).reshape(*shape, 3)
         self.leave = np.array([one.leave for way in filled for one in way], dtype=np.float64).reshape(*shape, 3)
         length_m = np.array([one.length_m for way in filled for one in way], dtype=np.float64).reshape(shape)
@@ -110,6 +120,13 @@ class StripWays:
             on_s = [_sonar_on_s(one, helper) for way in filled for one in way]
             self.sonar_on_s = rounded(np.array(on_s, dtype=np.float64).reshape(shape))
         self.run_out_s = rounded(helper.run_in_s(self.leave))
+
+    def home_s(self, helper: Helper) -> FloatArray:
+        """See `Helper.home_s`, of one that flies so, from where ways are left."""
+        if helper.way_home not in self._home_s:
+            home_s = helper.home_s(self.leave.reshape(-1, 3))
+            self._home_s[helper.way_home] = rounded(home_s.reshape(self.sonar_on_s.shape))
+        return self._home_s[helper.way_home]
 
     def to_begin_s(self, poses: FloatArray) -> FloatArray:
         """How long it is from poses, shape (n, 3), until the sonar goes on, shape (n, strips, ways)."""
@@ -125,9 +142,24 @@ class StripWays:
         way_s = way_m / sailing.made_good_mps(np.arctan2(east_m, north_m), x_m, y_m)
         return rounded(way_s + helper.run_in_s(self.entry))
 
-    def shortest_from(self, poses: FloatArray) -> tuple[FloatArray, NDArray[np.intp]]:
+    def shortest_from(self, poses: FloatArray) -> _Shortest:
         """Of each strip the way that is shortest from poses, shape (n, 3), as an agent flies it: how long it is until
-        the sonar goes on, and which way that is, both of shape (n, strips)."""
+        the sonar goes on, and which way that is, both of shape (n, strips) and not to be changed."""
+        asked = poses.tobytes()
+        if asked not in self._shortest:
+            if len(self._shortest) == MOST_KEPT:
+                self._shortest.clear()
+            self._shortest[asked] = found = self._shortest_from(poses)
+            for array in found:
+                array.setflags(write=False)
+        return self._shortest[asked]
+
+    def shortest_from_each(self, several: Sequence[FloatArray]) -> _Shortest:
+        """The same from several times some poses, one after the other; arrays of the caller's own."""
+        begins_s, ways = zip(*map(self.shortest_from, several), strict=True)
+        return np.concatenate(begins_s), np.concatenate(ways)
+
+    def _shortest_from(self, poses: FloatArray) -> _Shortest:
         to_begin_s, tie_s = self.to_begin_s(poses), TIE_M / self._helper.speed_mps
         shortest_s, begins_s = to_begin_s[:, :, 0] + self.sonar_on_s[:, 0], to_begin_s[:, :, 0].copy()
         ways = np.zeros(begins_s.shape, dtype=np.intp)
@@ -140,18 +172,46 @@ class StripWays:
         return begins_s, ways
 
 
+_Place = tuple[Point, float, float, float]
+"""Of a strip's fields all but the number."""
+
+
+@dataclass(frozen=True)
+class _Flier:
+    """A helper, for which any stands that flies alike."""
+
+    alike: Hashable
+    helper: Helper = field(compare=False)
+
+
+@lru_cache(maxsize=MOST_KEPT)
+def _ways_over(places: tuple[_Place, ...], flier: _Flier) -> StripWays:
+    return StripWays([Strip(0, *one) for one in places], flier.helper)
+
+
+def ways_over(strips: Sequence[OpenStrip], helper: Helper) -> StripWays:
+    """The ways of a helper over some strips; kept, as mostly they are the next time where they were."""
+    alike = (
+        (helper.speed_mps, helper.turn_radius_m, helper.run_in_m, helper.swath_m, helper.beside_m, helper.lead_m),
+        (helper.keep_out, helper.sailing),
+    )
+    all_strips = (one.strip for one in strips)
+    places = tuple((one.start, one.heading_rad, one.length_m, one.width_m) for one in all_strips)
+    return _ways_over(places, _Flier(alike, helper))
+
+
 class StripTable:
-    """What a helper finds at each of some strips, flown in each of some `ways`, whose arrays are here, too.
+    """What a helper finds at each of some strips, flown in each of its `ways`, whose arrays are here, too.
 
     `home_s`: see `Helper.home_s`, shape (strips, ways). `worth_m2`: what the strip's sweep removes, shape (strips,); 0
     for one that the helper is not to be offered.
     """
 
-    def __init__(self, strips: Sequence[OpenStrip], helper: Helper, ways: StripWays | None = None) -> None:
-        self.ways = StripWays(strips, helper) if ways is None else ways
+    def __init__(self, strips: Sequence[OpenStrip], helper: Helper) -> None:
+        self.ways = ways_over(strips, helper)
         self.helper = helper
         self.leave, self.sonar_on_s, self.run_out_s = self.ways.leave, self.ways.sonar_on_s, self.ways.run_out_s
-        self.home_s = rounded(helper.home_s(self.leave.reshape(-1, 3)).reshape(self.sonar_on_s.shape))
+        self.home_s = self.ways.home_s(helper)
         risk_m2 = [0.0 if one.strip.number in helper.refused else one.risk_m2 for one in strips]
         self.worth_m2 = helper.p_detect * np.array(risk_m2, dtype=np.float64)
 
@@ -173,18 +233,3 @@ class StripTable:
         ends_s = begins_s + sonar_on_s + self.run_out_s[strips, way]
         removed_m2 = self.removed_m2(begins_s[:, np.newaxis], deadline_s)
         return removed_m2[strips, way], ends_s, self.leave[strips, way]
-
-
-def tables_of(strips: Sequence[OpenStrip], helpers: Iterable[Helper]) -> list[StripTable]:
-    """What each helper finds; the ways of those that fly alike are worked out once."""
-    ways = dict[Hashable, StripWays]()
-    tables = []
-    for one in helpers:
-        alike = (
-            (one.speed_mps, one.turn_radius_m, one.run_in_m, one.swath_m, one.beside_m, one.lead_m),
-            (one.keep_out, one.sailing),
-        )
-        if alike not in ways:
-            ways[alike] = StripWays(strips, one)
-        tables.append(StripTable(strips, one, ways[alike]))
-    return tables

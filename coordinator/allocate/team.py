@@ -9,7 +9,7 @@ from statistics import median
 
 import numpy as np
 
-from coordinator.allocate.service import StripTable, StripWays, tables_of
+from coordinator.allocate.service import StripTable, StripWays
 from coordinator.allocate.situation import HORIZON_S, Helper, OpenStrip
 from planner.types import FloatArray
 
@@ -35,7 +35,7 @@ class Team:
     def __init__(self, strips: Sequence[OpenStrip], helpers: Sequence[Helper], deadline_s: float) -> None:
         self.helpers = helpers
         self.strips = _most_promising(strips, helpers)
-        tables = tables_of(self.strips, helpers)
+        tables = [StripTable(self.strips, one) for one in helpers]
         count, ways = len(self.strips), max(one.sonar_on_s.shape[1] for one in tables)
         self.start, self.nodes = count * ways, count * ways + 1
         places = np.arange(count)
@@ -44,8 +44,8 @@ class Team:
             table = tables[some[0]]
             own = table.sonar_on_s.shape[1]
             nodes = (places[:, np.newaxis] * ways + np.arange(own)).ravel()
-            starts = [helpers[number].free_at for number in some]
-            its_s, chosen = table.ways.shortest_from(np.concatenate([table.leave.reshape(-1, 3), starts]))
+            starts = np.array([helpers[number].free_at for number in some], dtype=np.float64)
+            its_s, chosen = table.ways.shortest_from_each([table.leave.reshape(-1, 3), starts])
             way, sweep_s = places * ways + chosen, table.sonar_on_s[places, chosen]
             for place, number in enumerate(some, start=nodes.size):
                 its, home_s = self.table[number], tables[number].home_s[places, chosen]

@@ -21,6 +21,7 @@ from planner.ways import shortest_way
 NORTH, EAST, SOUTH = 0.0, math.pi / 2, math.pi
 # Between them there is a gap of 40 m, and home lies in the bay to the north of it.
 HEADLANDS = KeepOut((((-300, 20), (-20, 20), (-20, 60), (-300, 60)), ((20, 20), (300, 20), (300, 60), (20, 60))), 1.5)
+SHARES = st.floats(0.8, 1.2).filter(lambda share: abs(share - 1) > 1e-9)  # of a limit that is rounded itself
 # How the water flows differs from corner to corner.
 EDDY = FlowGrid(
     np.array([-150.0, 200.0]),
@@ -114,7 +115,7 @@ class TestByHand:
         assert not past_zones.is_well_within(pose, time_s)
         assert past_zones.is_well_within(pose, time_s + 0.01)
 
-    @given(st.floats(-250, 250), st.floats(-100, 15), st.floats(0, 6.28), st.floats(0.5, 3), st.floats(0.8, 1.2))
+    @given(st.floats(-250, 250), st.floats(-100, 15), st.floats(0, 6.28), st.floats(0.5, 3), SHARES)
     @example(250, 15, 0, 0.5, 0.95)
     def test_what_is_well_within_past_zones_goes_by_about_how_long_it_takes(
         self, x_m: float, y_m: float, heading_rad: float, radius_m: float, share: float

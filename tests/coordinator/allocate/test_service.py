@@ -11,7 +11,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from situations import helper, open_strip, situations, strip
 
-from coordinator.allocate.service import Service, StripTable, can_fly, expected_service, removed_m2, tables_of
+from coordinator.allocate.service import (
+    MOST_KEPT,
+    Service,
+    StripTable,
+    StripWays,
+    can_fly,
+    expected_service,
+    removed_m2,
+)
 from coordinator.allocate.situation import Situation
 from planner.currents import FlowGrid, Sailing
 from planner.dubins import Pose
@@ -204,15 +212,40 @@ def test_of_two_ways_that_are_the_same_length_the_first_is_taken() -> None:
 def test_only_the_ways_of_those_that_fly_alike_are_worked_out_in_common(other: dict[str, object]) -> None:
     jobs = [open_strip(strip(1)), open_strip(strip(2, x_m=200))]
     one, two = helper(), replace(helper(), **other)  # type: ignore[arg-type]
-    tables = tables_of(jobs, [one, two])
+    tables = [StripTable(jobs, its) for its in (one, two)]
     flies_alike = not other or next(iter(other)) in ("vehicle", "p_detect", "lasts_until_s", "refused")
     assert (tables[0].ways is tables[1].ways) is flies_alike
     for table, its in zip(tables, (one, two), strict=True):
-        lone = StripTable(jobs, its)
+        lone = StripWays([job.strip for job in jobs], its)
         assert table.helper is its
-        assert (table.worth_m2 == lone.worth_m2).all()
+        assert (table.home_s == lone.home_s(its)).all()
         assert (table.sonar_on_s == lone.sonar_on_s).all()
         assert (table.leave == lone.leave).all()
+
+
+def test_what_was_worked_out_for_strips_stands_for_others_at_the_same_places() -> None:
+    one, east, west = helper(), Pose(500, 0, 1.0), Pose(-900, 0, 1.0)
+    homes = [replace(one, way_home=WayHome(home[:2], Sailing(one.speed_mps), 6.0)) for home in (east, west)]
+    tables = [StripTable([open_strip(strip(number))], its) for number, its in zip((1, 2), homes, strict=True)]
+    assert tables[0].ways is tables[1].ways
+    for table, its in zip(tables, homes, strict=True):  # but for where each comes home
+        assert (table.home_s == StripWays([strip(1)], its).home_s(its)).all()
+    assert (tables[0].home_s != tables[1].home_s).any()
+    ways, alone = tables[0].ways, StripWays([strip(1)], one)
+    for poses in [
+        np.array([east, west]),
+        *(np.array([[x_m, 0.0, 1.0]]) for x_m in range(MOST_KEPT + 1)),
+        np.array([east]),
+    ]:
+        expected = alone.shortest_from(poses)
+        for found in (ways.shortest_from(poses), ways.shortest_from(poses), ways.shortest_from_each([poses])):
+            assert [array.tolist() for array in found] == [array.tolist() for array in expected]
+    begins_s, _ = ways.shortest_from(poses)
+    with pytest.raises(ValueError, match="read-only"):
+        begins_s += 1
+    its_own_s, _ = ways.shortest_from_each([poses, np.array([west])])
+    its_own_s += 1
+    assert its_own_s[:1].tolist() == (begins_s + 1).tolist()
 
 
 class TestHowLongRunInsAndWaysHomeTake:
