@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 from comms.said.announcement import Role, RosterVehicle
 from comms.said.codec import Header
@@ -25,6 +26,7 @@ from planner.way_home import WayHome
 log = logging.getLogger("secondlook.coordinator")
 
 
+@lru_cache(maxsize=1_000)
 def expected_end_ms(
     entry: RosterVehicle,
     state: AgentState | None,

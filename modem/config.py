@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Literal
 
 from modem.streams import STREAM_BITS, STREAMS, TURN_BITS, Window
@@ -22,6 +22,7 @@ LARGEST_LEAST_BITS = 256
 """In frames of so many bits all platforms can talk that there may be."""
 
 
+@cache
 def least_frame_bits(platforms: int, *, polled: bool = False) -> int:
     """The fewest bits of a frame in which so many platforms, at most 64, can talk: it holds an acknowledgement of one
     other, or a piece of a message, as all larger ones do."""

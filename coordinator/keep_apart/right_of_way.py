@@ -243,7 +243,7 @@ class RightOfWay:
 
     def _place_aside(self, one: Underway, courses: list[Course], now_s: float) -> Point | None:
         """The nearest place in the area at which it can wait; None where there is none."""
-        here = self._traffic.holding(one.vehicle, one.strip, now_s).at(now_s)
+        here = self._traffic.here(one.vehicle, one.strip, now_s)
         for for_s in (2 * CLEAR_AHEAD_S, STANDS_ASIDE_S):
             for share, aside_rad in product((2.0, 3.5, 5.0), ASIDE_RAD):
                 bearing_rad = here.heading_rad + aside_rad

@@ -82,9 +82,16 @@ class Traffic:
             return self._on_errand(vehicle, errand)
         return self._rest(vehicle)
 
+    def here(self, vehicle: KnownVehicle, strip: Strip | None, now_s: float) -> Pose:
+        """Where a vehicle is that is told something now."""
+        state = vehicle.state
+        assert state is not None
+        laid = self.course(vehicle, strip, now_s)
+        return pose_of(state) if laid is None else laid.at(now_s)
+
     def to_strip(self, vehicle: KnownVehicle, strip: Strip | None, other: Strip, now_s: float) -> tuple[Course, Sweep]:
         """The course of a helper that leaves what it does and sets out to another strip now, and how it sweeps it."""
-        pose = self._here(vehicle, now_s, strip)
+        pose = self.here(vehicle, strip, now_s)
         return self.onward(vehicle, pose, now_s, other, self._run_out_m(vehicle, pose))
 
     def onward(
@@ -101,13 +108,13 @@ class Traffic:
 
     def aside(self, vehicle: KnownVehicle, strip: Strip | None, place: Point, now_s: float) -> Course:
         """The course of a helper that leaves what it does and waits at a place."""
-        return self._to_place(vehicle, self._here(vehicle, now_s, strip), now_s, place)
+        return self._to_place(vehicle, self.here(vehicle, strip, now_s), now_s, place)
 
     def has_room(self, vehicle: KnownVehicle, strip: Strip | None, place: Point, now_s: float) -> bool:
         """Whether a helper that leaves what it does can go to a place and circle there."""
         if not self._keep_out:
             return True
-        pose, radius_m = self._here(vehicle, now_s, strip), vehicle.entry.turn_radius_m
+        pose, radius_m = self.here(vehicle, strip, now_s), vehicle.entry.turn_radius_m
         run_out = self._run_out(vehicle, pose)
         end = run_out.pose_at(run_out.length_m)
         there = _arrival(pose, place)
@@ -116,7 +123,7 @@ class Traffic:
 
     def holding(self, vehicle: KnownVehicle, strip: Strip | None, now_s: float) -> Course:
         """The course of a helper that leaves what it does and circles where it is."""
-        pose = self._here(vehicle, now_s, strip)
+        pose = self.here(vehicle, strip, now_s)
         entry, run_out = vehicle.entry, self._run_out(vehicle, pose)
         return course(pose, now_s, vehicle.sailing, entry.turn_radius_m, [run_out], self._keep_out)
 
@@ -128,13 +135,6 @@ class Traffic:
     def sent_aside(self, vehicle: KnownVehicle, strip: Strip | None, place: Point, now_s: float) -> None:
         """A helper was told to wait at a place."""
         self._errands[vehicle.entry.vehicle] = _Errand(place, self.aside(vehicle, strip, place, now_s))
-
-    def _here(self, vehicle: KnownVehicle, now_s: float, strip: Strip | None) -> Pose:
-        """Where a vehicle is that is told something now."""
-        state = vehicle.state
-        assert state is not None
-        laid = self.course(vehicle, strip, now_s)
-        return pose_of(state) if laid is None else laid.at(now_s)
 
     def _survey(self, vehicle: KnownVehicle, now_s: float) -> Course:
         state, plan, name = vehicle.state, vehicle.plan, vehicle.entry.vehicle
