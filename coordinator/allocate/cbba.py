@@ -150,7 +150,8 @@ class _Routes:
         self._strips = len(strips)
         considered = [strips[place] for place in self._places]
         table = StripTable(considered, helper)
-        to_begin_s, ways = table.ways.shortest_from_each([np.array([helper.free_at]), table.leave.reshape(-1, 3)])
+        start = np.array([helper.free_at], dtype=np.float64)
+        to_begin_s, ways = table.ways.shortest_from_each([start, table.leave.reshape(-1, 3)])
         to_begin_s[0] += helper.wait_s(considered)
         numbers = np.arange(len(considered))
         # From each of these to each strip: for how long the sonar is on and it then sails on, the time until it is free
