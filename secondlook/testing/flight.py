@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any, overload
 
@@ -81,8 +81,8 @@ class Heard(Sequence[Received]):
         if keys == "**":
             return self._all
         found, looked_at = self._found.get(keys, ([], 0))
-        chosen = chosen_keys(keys, self._vehicles)
-        found.extend(one for one in self._all[looked_at:] if chosen.includes(one.key))
+        is_chosen = cache(chosen_keys(keys, self._vehicles).includes)  # few keys are said again and again
+        found.extend(one for one in self._all[looked_at:] if is_chosen(one.key))
         self._found[keys] = found, len(self._all)
         return found
 

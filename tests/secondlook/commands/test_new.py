@@ -222,7 +222,7 @@ def test_ground_too_small_to_survey_is_refused_and_of_very_large_the_key_to_chan
 ) -> None:
     for far_deg, code, told in (
         (2e-5, 2, "bay.geojson: the ground is less than 5 m across, too small to be surveyed"),
-        (0.5, 0, "bay.geojson: vehicles.primary.endurance_s: 36000 s (10:00:00) ends its survey after about"),
+        (0.1, 0, "bay.geojson: vehicles.primary.endurance_s: 36000 s (10:00:00) ends its survey after about"),
     ):
         draw(polygon([(9.8, 44.0), (9.8 + far_deg, 44.0), (9.8 + far_deg, 44 + far_deg), (9.8, 44 + far_deg)]))
         assert command(monkeypatch, "new", "bay.geojson") == code
