@@ -170,9 +170,10 @@ class Modem:
         self._packets = Packets(self.config, self._form, self._queue, self._sending, self._receiving, self._starts)
         keep_out = KeepOut(run.keep_out_outlines, run.keep_out_margin_m)
         known = self.config.others if self.config.is_hub else (self.config.platform,)
-        tells_when = not self.config.is_small
         self._presences = {
-            one.vehicle: Presence(one, keep_out, on_its_way=tells_when) for one in run.vehicles if one.vehicle in known
+            one.vehicle: Presence(one, keep_out, reckons_ways=not self.config.is_small)
+            for one in run.vehicles
+            if one.vehicle in known
         }
         entry = next((one for one in run.vehicles if one.vehicle == self.config.platform), None)
         self._grid = run.grid.spec

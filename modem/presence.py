@@ -41,13 +41,13 @@ def seldom_ms(config: ModemConfig) -> int:
 class Presence:
     """A vehicle as it is reckoned with. `entry`: as it was announced; `keep_out`: what it may not enter. `told_ms`:
     when its last state was said, or a word on a task that tells as much. `strips`: those it was given, by number.
-    `on_its_way`: it is reckoned on its way to a strip, where words tell when they were said; without, it stands still
+    `reckons_ways`: it is reckoned on its way to a strip, where words tell when they were said; without, it stands still
     until it is heard to have begun."""
 
-    def __init__(self, entry: RosterVehicle, keep_out: KeepOut = NOWHERE, *, on_its_way: bool = True) -> None:
+    def __init__(self, entry: RosterVehicle, keep_out: KeepOut = NOWHERE, *, reckons_ways: bool = True) -> None:
         self.told_ms = 0
         self.strips: dict[int, Strip] = {}
-        self._entry, self._keep_out, self._reckons_ways = entry, keep_out, on_its_way
+        self._entry, self._keep_out, self._reckons_ways = entry, keep_out, reckons_ways
         self._state: AgentState | None = None
         self._incarnation = 0
         self._said_ms = 0

@@ -113,7 +113,7 @@ def test_it_goes_to_a_strip_from_where_it_says_that_it_is() -> None:
 
 
 def test_where_words_do_not_tell_when_it_stands_still_until_it_is_heard_to_have_begun() -> None:
-    presence = Presence(BETA, on_its_way=False)
+    presence = Presence(BETA, reckons_ways=False)
     presence.strips[7] = NORTH
     presence.hear_state(IDLE, 0, 0)
     presence.hear_status(status(TaskState.ACCEPTED), 10_000)

@@ -130,6 +130,26 @@ def test_a_helper_is_taken_to_be_where_its_strip_ends() -> None:
     assert last.x_m != 102.0  # type: ignore[attr-defined]
 
 
+@pytest.mark.parametrize(("frame_bits", "stands"), [(34, True), (256, False)])
+def test_only_where_words_tell_when_they_were_said_is_a_helper_reckoned_on_its_way(
+    frame_bits: int, *, stands: bool
+) -> None:
+    waters = Waters(frame_bits=frame_bits)
+    waters.say("beta", "agent/beta/state", replace(IDLE, x_m=100.0, y_m=-400.0))
+    waters.say("coordinator", "coord/task/beta/1", TAKE)
+    waters.run(10 * CYCLE_MS)
+    waters.say("beta", "agent/beta/task_status/1", replace(DONE, state=TaskState.ACCEPTED))
+    for _ in range(12):
+        waters.run(waters.now_ms + 10_000)
+        its_m = -400.0 + 2.0 * (waters.now_ms - 10 * CYCLE_MS) / 1000
+        on_its_way = replace(IDLE, mode=Mode.TRANSIT, works_on=7, x_m=100.0, y_m=its_m)
+        waters.say("beta", "agent/beta/state", on_its_way)
+    going = [one for _, one in told(waters, "ship", AgentState) if one.mode is Mode.TRANSIT]  # type: ignore[attr-defined]
+    north_m = [one.y_m for one in going]  # type: ignore[attr-defined]
+    assert len(north_m) > 1
+    assert (max(north_m) - min(north_m) < 5.0) is stands
+
+
 @settings(max_examples=300)
 @given(
     bits=st.lists(st.integers(0, (1 << 26) - 1), min_size=1, max_size=8),
