@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.int64]
 Point = tuple[float, float]
 Window = tuple[slice, slice]
 """Some rows and columns of a grid."""

@@ -16,21 +16,20 @@ nothing is planned: each helper is offered what brings most a second.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from coordinator.allocate.plans import Completion, Plans
+from coordinator.allocate.beam import best_routes
 from coordinator.allocate.service import expected_service, removed_m2
 from coordinator.allocate.simple import GreedyAllocator
 from coordinator.allocate.situation import HORIZON_S, Helper, OpenStrip, Situation
-from coordinator.allocate.team import Team, Teams
+from coordinator.allocate.team import Team
 from planner.types import FloatArray
 
 BEAM = 12
 """Plans carried from one strip to the next."""
-TOLERANCE_M2 = 1e-6
 
 
 @dataclass(frozen=True)
@@ -104,61 +103,23 @@ def plan_routes(strips: Sequence[OpenStrip], helpers: Sequence[Helper], deadline
 
 
 def plan_each(choices: Sequence[Choice], deadline_s: float, beam: int, price: float = 0.0) -> list[Routes]:
-    """The same for each of several choices, all for the same helpers but for where and when they are free. They are
-    planned side by side, which hardly takes longer than one by itself, as there are few plans in a beam."""
-    teams = [Team(strips, helpers, deadline_s) for strips, helpers in choices if strips and helpers]
-    found = iter(_planned(Teams(teams, price), beam) if teams else ())
-    return [
-        next(found) if strips and helpers else Routes(0.0, 0.0, {one.vehicle: () for one in helpers}, {})
-        for strips, helpers in choices
-    ]
+    """The same for each of several choices, all for the same helpers but for where and when they are free. What time is
+    worth is told by the first of them."""
+    teams = [Team(strips, helpers, deadline_s) if strips and helpers else None for strips, helpers in choices]
+    time_m2ps = next((one.time_m2ps(price) for one in teams if one is not None), None)
+    found = []
+    for (_, helpers), team in zip(choices, teams, strict=True):
+        if team is None or time_m2ps is None:
+            found.append(Routes(0.0, 0.0, {one.vehicle: () for one in helpers}, {}))
+        else:
+            found.append(_planned(team, time_m2ps, beam))
+    return found
 
 
-def _planned(teams: Teams, beam: int) -> list[Routes]:
-    """The routes of each team."""
-    completed, sizes = _completed(teams, beam)
-    counts_m2, best = completed.counts_m2(teams), []
-    for number in range(len(teams.all)):
-        (own,) = (completed.team == number).nonzero()
-        best.append(own[_best(counts_m2[own], [size[number] for size in sizes])])
-    plans = completed.chosen(np.array(best))
-    if len(teams.helpers) > 1:  # who had left the rest to others takes what those leave
-        plans.is_done[:] = False
-        plans = _to_deadline(plans, teams, len(sizes))
-    return [_told(team, route, teams.time_m2ps) for team, route in zip(teams.all, plans.routes(), strict=True)]
-
-
-def _told(team: Team, routes: Sequence[Sequence[int]], time_m2ps: FloatArray) -> Routes:
-    """A team's routes by the numbers of its strips; `routes`: of each helper, by their places."""
+def _planned(team: Team, time_m2ps: FloatArray, beam: int) -> Routes:
+    """The routes of a team by the numbers of its strips."""
+    routes = best_routes(team.found(time_m2ps), beam)
     numbers = (tuple(team.strips[place].strip.number for place in route) for route in routes)
     removed_m2, left_s, shares = team.flown(routes)
     counts_m2 = removed_m2 + float(time_m2ps @ np.array(left_s))
     return Routes(removed_m2, counts_m2, dict(zip((one.vehicle for one in team.helpers), numbers, strict=True)), shares)
-
-
-def _completed(teams: Teams, beam: int) -> tuple[Plans, list[list[int]]]:
-    """The plans of all beams, one beam after the other, each gone on with to the deadline; and of each beam how many
-    each team has."""
-    completion, plans, sizes = Completion(teams), Plans.begun(teams), list[list[int]]()
-    while plans.count:
-        sizes.append(np.bincount(plans.team, minlength=len(teams.all)).tolist())
-        completion.take(plans)
-        plans = completion.grow(plans.count, beam)
-    return completion.ended(), sizes
-
-
-def _to_deadline(plans: Plans, teams: Teams, turn: int) -> Plans:
-    """Each gone on with to the deadline, from its so manieth strip on."""
-    completion = Completion(teams, turn)
-    completion.take(plans)
-    return completion.ended()
-
-
-def _best(counts_m2: FloatArray, sizes: Iterable[int]) -> int:
-    """The plan that counts most; of those that hardly differ one of an earlier beam. `sizes`: of the beams."""
-    best = first = 0
-    for size in filter(None, sizes):
-        one = first + int(counts_m2[first : first + size].argmax())
-        best = one if counts_m2[one] > counts_m2[best] + TOLERANCE_M2 else best
-        first += size
-    return best

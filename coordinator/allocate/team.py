@@ -9,6 +9,7 @@ from statistics import median
 
 import numpy as np
 
+from coordinator.allocate.beam import Found
 from coordinator.allocate.service import StripTable, StripWays
 from coordinator.allocate.situation import HORIZON_S, Helper, OpenStrip
 from planner.types import FloatArray
@@ -55,10 +56,10 @@ class Team:
                 if helpers[number].task is None and helpers[number].waits_s:
                     its[self.start, 0] += helpers[number].wait_s(self.strips)
                 its[:, 3] = tables[number].worth_m2
-        self.run_out_s = np.array([one.run_in_m / one.speed_mps for one in helpers])
-        self.lasts_s = np.array([one.lasts_until_s for one in helpers])
+        self.run_out_s = np.array([one.run_in_m / one.speed_mps for one in helpers], dtype=np.float64)
+        self.lasts_s = np.array([one.lasts_until_s for one in helpers], dtype=np.float64)
         self.until_s = np.minimum(self.lasts_s, deadline_s)
-        self.deadline_s = deadline_s
+        self.deadline_s = float(deadline_s)
         self.alone_m2 = self.table[:, self.start, 3].max(axis=0)
         sweeps_s = np.array([one.sonar_on_s.min(axis=1) for one in tables]).min(axis=0)
         self.alone_s = sweeps_s + self._usual_way_s(self.table[:, :, 0])
@@ -76,6 +77,26 @@ class Team:
         left_s = float(np.maximum(self.until_s - [one.free_s for one in self.helpers], 0.0).sum())
         left_over = 1.0 - self._takes_s / left_s if self._takes_s < left_s else 0.0
         return price * left_over * np.array([one.p_detect * one.speed_mps for one in self.helpers])
+
+    def found(self, time_m2ps: FloatArray) -> Found:
+        """The same as it is searched; `time_m2ps`: what a second is worth that each helper keeps."""
+        usual_m2ps = float(time_m2ps.mean())
+        return Found(
+            table=self.table,
+            way=self.way,
+            free_s=np.array([one.free_s for one in self.helpers], dtype=np.float64),
+            run_out_s=self.run_out_s,
+            lasts_s=self.lasts_s,
+            until_s=self.until_s,
+            deadline_s=self.deadline_s,
+            time_m2ps=time_m2ps,
+            alone_s=self.alone_s,
+            alone_m2=np.maximum(self.alone_m2 - self.alone_s * usual_m2ps, 0.0),
+            by_rate=self.by_rate,
+            rank=self.rank,
+            later_m2ps=max(0.0, self.later_m2ps - usual_m2ps),
+            later_s=HORIZON_S,
+        )
 
     def flown(self, routes: Sequence[Sequence[int]]) -> tuple[float, list[float], dict[int, float]]:
         """What is removed by the deadline, how much time is left to each helper then, and by number the share of each
@@ -101,42 +122,6 @@ class Team:
         least_s = np.append(nearest_s.min(axis=1), to_begin_s[:, self.start].min())
         finite_s = least_s[np.isfinite(least_s)].tolist()
         return median(finite_s) if finite_s else math.nan
-
-
-class Teams:
-    """Teams of the same helpers, but for where and when they are free, each with strips of its own, whose tables lie
-    one behind the other; strips and nodes are as many as the team with the most of them has, those that others have not
-    bring nothing.
-
-    `table`, shape (teams * helpers * nodes, 4, strips), `way`, (teams * helpers * nodes, strips), `by_rate` and `rank`,
-    (teams, strips), `start` and `later_m2ps`, (teams,): see `Team`. `free_s`: shape (teams, helpers). `time_m2ps`: see
-    `Team.time_m2ps`; what strips bring, and what time does behind all of them, is told beyond that. `alone`:
-    `alone_s` and `alone_m2`, shape (teams, 2, strips), and in order of `by_rate` `alone_by_rate`; `later`: what comes
-    behind all strips, shape (teams, 2).
-    """
-
-    def __init__(self, teams: Sequence[Team], price: float = 0.0) -> None:
-        self.all, self.helpers, self.deadline_s = teams, teams[0].helpers, teams[0].deadline_s
-        self.strips, self.nodes = max(len(one.strips) for one in teams), max(one.nodes for one in teams)
-        self.run_out_s, self.lasts_s, self.until_s = teams[0].run_out_s, teams[0].lasts_s, teams[0].until_s
-        self.start = np.array([one.start for one in teams])
-        self.free_s = np.array([[helper.free_s for helper in one.helpers] for one in teams], dtype=np.float64)
-        self.time_m2ps = teams[0].time_m2ps(price)
-        usual_m2ps = float(self.time_m2ps.mean())
-        self.later_m2ps = np.array([max(0.0, one.later_m2ps - usual_m2ps) for one in teams])
-        self.later = np.array([(HORIZON_S, HORIZON_S * later_m2ps) for later_m2ps in self.later_m2ps.tolist()])
-        table, way = _empty((len(teams), len(self.helpers), self.nodes), self.strips)
-        self.by_rate = np.tile(np.arange(self.strips), (len(teams), 1))
-        self.rank = self.by_rate.copy()
-        self.alone, self.alone_by_rate = np.zeros((2, len(teams), 2, self.strips))
-        for number, one in enumerate(teams):
-            own, nodes = len(one.strips), one.nodes
-            table[number, :, :nodes, :, :own], way[number, :, :nodes, :own] = one.table, one.way
-            self.by_rate[number, :own], self.rank[number, :own] = one.by_rate, one.rank
-            self.alone[number, 0, :own] = one.alone_s
-            self.alone[number, 1, :own] = np.maximum(one.alone_m2 - one.alone_s * usual_m2ps, 0.0)
-            self.alone_by_rate[number, :, :own] = self.alone[number].take(one.by_rate, axis=1)
-        self.table, self.way = table.reshape(-1, 4, self.strips), way.reshape(-1, self.strips)
 
 
 def _empty(nodes: tuple[int, ...], strips: int) -> tuple[FloatArray, np.ndarray]:

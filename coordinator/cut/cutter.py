@@ -10,9 +10,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
+from coordinator.cut.cutting import Cutting
 from coordinator.cut.ground import Ground
 from coordinator.cut.room import Room
-from coordinator.cut.strips import Counted, Cut, Cutting, CuttingRules, cells_wide
+from coordinator.cut.strips import Counted, Cut, CuttingRules, cells_wide
 from coordinator.cut.window import Window
 from planner.types import GridSpec
 

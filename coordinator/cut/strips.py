@@ -1,24 +1,14 @@
-"""Cuts strips: rectangles along the tracks or across them, as wide as the helper's swath, where a second look is worth
-the most.
-
-What a look is expected to bring is summed over every window as wide as the swath; each metre of a strip, and each way
-to one, has its price. Windows side by side are chosen that together bring most beyond that; their cells then count as
-if they had been flown, and the search goes on with what is left.
-"""
+"""Strips as they are cut: what is cut of which length, what a window counts, and the rectangle that it becomes."""
 
 from __future__ import annotations
 
 import math
-from copy import copy
 from dataclasses import dataclass
-from itertools import pairwise
 
-from coordinator.cut.bands import TOLERANCE, Bands
-from coordinator.cut.ground import Ground
 from coordinator.cut.window import Window
 from planner.types import GridSpec, Strip
 
-MOST_PASSES = 6  # of the search, each over what those before have left
+TOLERANCE = 1e-9  # relative: sums that differ by no more count as equal
 
 
 @dataclass(frozen=True)
@@ -58,53 +48,6 @@ class Cut(Counted):
     why: str = ""
 
 
-class Cutting:
-    """Ground as windows are cut of it and flown, all along the tracks, or all across them."""
-
-    def __init__(self, grid: GridSpec, ground: Ground, rules: CuttingRules, *, across: bool = False) -> None:
-        self._cell_m, self._rules, self._across = grid.cell_m, rules, across
-        left = ground.copy()
-        self._ground = left.turned if across else left  # as it lies when strips run up the rows
-        width = min(self._ground.risk.shape[1], cells_wide(grid, rules.swath_m))
-        self._worth = self._ground.worth()
-        self._bands = Bands(self._worth, width)
-
-    def copy(self) -> Cutting:
-        """One that may be cut by itself."""
-        new = copy(self)
-        new._ground, new._bands = self._ground.copy(), self._bands.copy()
-        return new
-
-    def cut(self, price: float) -> list[Window]:
-        """Cuts the windows worth flying at a price for each metre flown, those first that lie side by side; one that
-        lies on another is worth a look when that has been flown. The ground is left as they leave it."""
-        found = list[Window]()
-        for _ in range(MOST_PASSES):
-            new = self._side_by_side(price)
-            if not new:
-                break
-            for window in new:
-                self._ground.fly(window)
-            self._worth = self._ground.worth()
-            self._bands.change(self._worth, new)
-            found += new
-        return [one.turned for one in found] if self._across else found
-
-    def _side_by_side(self, price: float) -> list[Window]:
-        """Windows up the rows that pay for themselves."""
-        row_cost, fixed_cost = price * self._cell_m, price * self._rules.overhead_m
-        shortest = max(1, round(self._rules.min_strip_m / self._cell_m))
-        longest = max(shortest, round(self._rules.max_strip_m / self._cell_m))
-        found = []
-        for band in self._bands.side_by_side(row_cost, fixed_cost):
-            for begin, end in _pieces(band.first_row, band.end_row, shortest, longest):
-                piece = Window(begin, end, band.first_column, band.end_column)
-                counts_m2 = float(self._worth[piece.cells].sum())
-                if counts_m2 > (piece.rows * row_cost + fixed_cost) * (1 + TOLERANCE):
-                    found.append(piece)
-        return found
-
-
 def strip_of(grid: GridSpec, window: Window, number: int) -> Strip:
     """The rectangle of a window, with its centre line up the grid's rows, or across them."""
     first_across_m, width_m = (window.first_column - 0.5) * grid.cell_m, window.columns_wide * grid.cell_m
@@ -121,15 +64,3 @@ def strip_of(grid: GridSpec, window: Window, number: int) -> Strip:
 def cells_wide(grid: GridSpec, swath_m: float) -> int:
     """Whole cells that a swath covers side by side, at least one."""
     return max(1, math.floor(swath_m / grid.cell_m + TOLERANCE))
-
-
-def _pieces(first: int, end: int, shortest: int, longest: int) -> list[tuple[int, int]]:
-    """A band of rows in equal pieces; where these would be too short, in longest ones, and a rest that is left out."""
-    if shortest <= end - first <= longest:
-        return [(first, end)]
-    count = -(-(end - first) // longest)
-    if end - first < count * shortest:
-        edges = list(range(first, end + 1, longest))
-    else:
-        edges = [round(first + (end - first) * piece / count) for piece in range(count + 1)]
-    return list(pairwise(edges))
