@@ -1,26 +1,65 @@
-"""What is worked on number by number is compiled: calls of numpy cost more than what they work on where there are few.
+"""What is worked on number by number is compiled, with numba: where there are few, calls of numpy cost more than what
+they work on.
 
-A compiled function is written in the part of Python that numba knows: numbers, arrays, tuples, and functions that are
-compiled, too. It does the same without, some hundred times slower, as with NUMBA_DISABLE_JIT=1 in the environment, by
-which a debugger or a measurement of coverage sees into it.
+A compiled function is written in the part of Python that numba knows: numbers, arrays, tuples of them, and compiled
+functions of its own file. Not compiled it does the same, a hundred times slower: with NUMBA_DISABLE_JIT=1 in the
+environment, so that a debugger sees into it.
 """
 
 from __future__ import annotations
 
+import functools
+import sys
 from collections.abc import Callable
-from typing import ParamSpec, TypeVar, cast
-
-import numba
+from typing import Any, Generic, ParamSpec, TypeVar
 
 P = ParamSpec("P")
 R = TypeVar("R")
 
 
-def compiled(function: Callable[P, R]) -> Callable[P, R]:
-    """Compiles a function, the first time that it is called, and keeps what comes of it on disk beside the source, or
-    in the user's cache where that may not be written to.
+class Compiled(Generic[P, R]):
+    """A function that is compiled as it is first called, for the types of what it is given.
 
-    It may call such functions of its own file alone: what is kept is made anew as its own file changes, and would go
-    on with what another file had once.
+    What comes of it is kept on disk, beside the source or, where that cannot be written to, in the user's cache, until
+    the file changes. So it may not call compiled functions of another file, which may change without that. numba itself
+    is imported with the first call: who never makes one does not wait for it.
     """
-    return cast(Callable[P, R], numba.njit(cache=True)(function))
+
+    def __init__(self, function: Callable[P, R]) -> None:
+        functools.update_wrapper(self, function)
+        self._function = function
+        self._made: Any = None
+
+    def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
+        """Calls it."""
+        if self._made is None:
+            _make_all(sys.modules[self._function.__module__].__dict__)
+        made: R = self._made(*args, **kwargs)
+        return made
+
+    @property
+    def compiled_for(self) -> int:
+        """For how many sorts of arguments it has been compiled so far; of each it takes seconds."""
+        return len(getattr(self._made, "signatures", ()))
+
+    def _make(self) -> Any:
+        import numba  # noqa: PLC0415, see the class
+
+        try:
+            self._made = numba.njit(cache=True)(self._function)
+        except RuntimeError:  # nowhere to keep it
+            self._made = numba.njit(self._function)
+        return self._made
+
+
+def compiled(function: Callable[P, R]) -> Compiled[P, R]:
+    """Has a function compiled."""
+    return Compiled(function)
+
+
+def _make_all(names: dict[str, Any]) -> None:
+    """Puts in a file's names those that numba makes in the place of its compiled functions, by which they find each
+    other."""
+    for name, one in list(names.items()):
+        if isinstance(one, Compiled):
+            names[name] = one._make()

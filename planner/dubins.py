@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planner.compiled import compiled
 from planner.rounding import rounded
 from planner.types import FloatArray, Point
 
@@ -182,57 +183,74 @@ def path_lengths_m(starts: FloatArray, ends: FloatArray, turn_radius_m: float) -
     Returns:
         Shape (n, m).
     """
-    # The axes of what follows: turning to port or to starboard first, start, end.
-    side = np.array([-1.0, 1.0])[:, np.newaxis, np.newaxis]
-    alpha, from_x, from_y = _turning_circles(starts[:, np.newaxis], turn_radius_m, side)
-    beta, to_x, to_y = _turning_circles(ends[np.newaxis], turn_radius_m, side)
+    return rounded(_lengths_m(np.ascontiguousarray(starts), np.ascontiguousarray(ends), float(turn_radius_m)))
+
+
+@compiled
+def _lengths_m(starts: FloatArray, ends: FloatArray, turn_radius_m: float) -> FloatArray:
+    lengths_m = np.empty((len(starts), len(ends)))
+    from_here, to_there = _in_radii(starts, turn_radius_m), _in_radii(ends, turn_radius_m)
+    for row in range(len(starts)):
+        for column in range(len(ends)):
+            to_port = _length(from_here[row], to_there[column], -1.0)
+            to_starboard = _length(from_here[row], to_there[column], 1.0)
+            is_shorter = to_starboard < to_port - TIE_M / turn_radius_m
+            lengths_m[row, column] = (to_starboard if is_shorter else to_port) * turn_radius_m
+    return lengths_m
+
+
+@compiled
+def _in_radii(poses: FloatArray, turn_radius_m: float) -> FloatArray:
+    """Of each pose where it is in turn radii, the heading counterclockwise from east, and the compass heading's cosine
+    and sine."""
+    found = np.empty((len(poses), 5))
+    for row in range(len(poses)):
+        heading_rad = poses[row, 2]
+        found[row, 0], found[row, 1] = poses[row, 0] / turn_radius_m, poses[row, 1] / turn_radius_m
+        found[row, 2], found[row, 3], found[row, 4] = (
+            math.pi / 2 - heading_rad,
+            math.cos(heading_rad),
+            math.sin(heading_rad),
+        )
+    return found
+
+
+@compiled
+def _length(start: FloatArray, end: FloatArray, side: float) -> float:
+    """The shortest that begins with a turn to a side, -1 for to port and 1 for to starboard, in turn radii, of poses as
+    `_in_radii` tells them."""
+    x, y, alpha, cos, sin = start[0], start[1], start[2], start[3], start[4]
+    end_x, end_y, beta, end_cos, end_sin = end[0], end[1], end[2], end[3], end[4]
+    from_x, from_y = x + side * cos, y - side * sin
 
     # From the centre of the first turn to that of a last turn to the same side.
-    x, y = to_x - from_x, to_y - from_y
-    between, direction = np.sqrt(x * x + y * y), np.arctan2(y, x)
-    apart = between >= _TOLERANCE
-    first = _turns(np.where(apart, -side * (direction - alpha), 0.0))
-    last = _turns(-side * (beta - np.where(apart, direction, alpha)))
-    same = first + np.where(apart, between, 0.0) + last
-    near = (apart & (between <= 4)).nonzero()
-    if near[0].size:
-        way, row, column = near
-        near_side = side[way, 0, 0]
-        middle = _FULL_TURN_RAD - 2 * np.arcsin(between[near] / 4)
-        towards = -near_side * (direction[near] - alpha[row, 0])
-        first = _turns(towards + middle / 2)
-        last = _turns(-near_side * (beta[0, column] - alpha[row, 0]) - first + middle)
-        same[near] = np.minimum(same[near], first + middle + last)
+    x, y = end_x + side * end_cos - from_x, end_y - side * end_sin - from_y
+    between = math.sqrt(x * x + y * y)
+    if between < _TOLERANCE:
+        shortest = _wrapped(-side * (beta - alpha))
+    else:
+        direction = math.atan2(y, x)
+        shortest = _wrapped(-side * (direction - alpha)) + between + _wrapped(-side * (beta - direction))
+        if between <= 4:
+            middle = _FULL_TURN_RAD - 2 * math.asin(between / 4)
+            first = _wrapped(-side * (direction - alpha) + middle / 2)
+            shortest = min(shortest, first + middle + _wrapped(-side * (beta - alpha) - first + middle))
 
     # To that of a last turn to the other side.
-    x, y = to_x[::-1] - from_x, to_y[::-1] - from_y
+    x, y = end_x - side * end_cos - from_x, end_y + side * end_sin - from_y
     straight_squared = x * x + y * y - 4
-    straight = np.sqrt(np.maximum(straight_squared, 0.0))
-    lean = -side * np.arctan2(y, x) + np.arctan2(2, straight)
-    other = _turns(lean + side * alpha) + straight + _turns(lean + side * beta)
-    other[straight_squared < -_TOLERANCE] = np.inf
-    to_port, to_starboard = np.minimum(same, other)
-    shortest = np.where(to_starboard < to_port - TIE_M / turn_radius_m, to_starboard, to_port)
-    return rounded(shortest * turn_radius_m)
+    if straight_squared >= -_TOLERANCE:
+        straight = math.sqrt(max(straight_squared, 0.0))
+        lean = -side * math.atan2(y, x) + math.atan2(2.0, straight)
+        shortest = min(shortest, _wrapped(lean + side * alpha) + straight + _wrapped(lean + side * beta))
+    return shortest
 
 
-def _turning_circles(
-    poses: FloatArray, turn_radius_m: float, side: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Headings counterclockwise from east, and the centres of the turns to each side, in turn radii."""
-    x, y, heading_rad = poses[..., 0] / turn_radius_m, poses[..., 1] / turn_radius_m, poses[..., 2]
-    return math.pi / 2 - heading_rad, x + side * np.cos(heading_rad), y - side * np.sin(heading_rad)
-
-
-def _turns(angles_rad: FloatArray) -> FloatArray:
-    """As `_turn`, for arrays; within two full turns either way this is the same to the last bit, and faster."""
-    turns = angles_rad / _FULL_TURN_RAD
-    np.floor(turns, out=turns)
-    turns *= _FULL_TURN_RAD
-    wrapped = np.subtract(angles_rad, turns, out=turns)
-    np.maximum(wrapped, 0.0, out=wrapped)  # just short of a full turn its share of one may have been rounded up
-    np.putmask(wrapped, _FULL_TURN_RAD - wrapped < _ANGLE_TOLERANCE_RAD, 0.0)
-    return wrapped
+@compiled
+def _wrapped(angle_rad: float) -> float:
+    """As `_turn`, to the last bit within two full turns either way."""
+    wrapped_rad = max(angle_rad - math.floor(angle_rad / _FULL_TURN_RAD) * _FULL_TURN_RAD, 0.0)
+    return 0.0 if _FULL_TURN_RAD - wrapped_rad < _ANGLE_TOLERANCE_RAD else wrapped_rad
 
 
 def _words(distance: float, alpha: float, beta: float) -> Iterator[tuple[float, int, int, tuple[float, float, float]]]:

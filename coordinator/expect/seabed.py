@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from coordinator.cut.window import Window
+from planner.compiled import compiled
 from planner.types import FloatArray, GridSpec
 
 ABOUT_M = 20.0
@@ -71,26 +72,33 @@ class Seabed:
 
 def sliding_mean(values: FloatArray, beside: int, axis: int) -> FloatArray:
     """The mean over up to `beside` places before and behind each along an axis."""
-    total = _running_sums(values, axis)
-    mean = np.empty_like(values)
-    sums, total = (mean, total) if axis == 0 else (mean.T, total.T)
-    size = len(sums)
-    reach = min(beside, size)
-    sums[: size - reach], sums[size - reach :] = total[reach + 1 :], total[size]
-    sums[reach + 1 :] -= total[1 : size - reach]
-    places = np.arange(size, dtype=np.float64)
-    sums /= (np.minimum(places + beside + 1, size) - np.maximum(places - beside, 0))[:, np.newaxis]
+    if axis == 0:
+        return _mean_of_rows(values, beside)
+    return _mean_of_columns(values, beside)
+
+
+@compiled
+def _mean_of_rows(values: FloatArray, beside: int) -> FloatArray:
+    rows, columns = values.shape
+    total, mean = np.zeros((rows + 1, columns)), np.empty((rows, columns))
+    for row in range(rows):
+        for column in range(columns):
+            total[row + 1, column] = total[row, column] + values[row, column]
+    for row in range(rows):
+        first, end = max(row - beside, 0), min(row + beside + 1, rows)
+        for column in range(columns):
+            mean[row, column] = (total[end, column] - total[first, column]) / (end - first)
     return mean
 
 
-def _running_sums(values: FloatArray, axis: int) -> FloatArray:
-    """Sums along an axis from its beginning to before each place, and to its end."""
+@compiled
+def _mean_of_columns(values: FloatArray, beside: int) -> FloatArray:
     rows, columns = values.shape
-    if axis == 1:
-        total = np.zeros((rows, columns + 1))
-        total[:, 1:] = values.cumsum(axis=1)
-        return total
-    total = np.zeros((rows + 1, columns))
-    for row in range(rows):  # faster than a sum column by column
-        np.add(total[row], values[row], out=total[row + 1])
-    return total
+    total, mean = np.zeros(columns + 1), np.empty((rows, columns))
+    for row in range(rows):
+        for column in range(columns):
+            total[column + 1] = total[column] + values[row, column]
+        for column in range(columns):
+            first, end = max(column - beside, 0), min(column + beside + 1, columns)
+            mean[row, column] = (total[end] - total[first]) / (end - first)
+    return mean
