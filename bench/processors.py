@@ -32,8 +32,13 @@ BUNDLED = [name for name in scenario_names() if name != "armada"]
 """All but one that takes a quarter of an hour."""
 NOT_EVERYWHERE = " ".join(np.show_config(mode="dicts")["SIMD Extensions"].get("found", ()))
 """What numpy makes use of that not every processor has."""
-PLAIN = {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX,-AVX2,-AVX512F,-FMA,-FMA4"}
-"""Has the C library work out `exp`, `sin` and the like, and OpenBLAS sums of products, as an old processor would."""
+PLAIN = {
+    "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX,-AVX2,-AVX512F,-FMA,-FMA4",
+    "NUMBA_CPU_NAME": "generic",
+    "NUMBA_CPU_FEATURES": "",
+}
+"""Has the C library work out `exp`, `sin` and the like, OpenBLAS sums of products, and what is compiled all else, as an
+old processor would."""
 if platform.machine() in ("x86_64", "AMD64"):
     PLAIN["OPENBLAS_CORETYPE"] = "Nehalem"
 ERRING = tuple(f"vehicles.{one}.position_error_m=10" for one in BOTH)

@@ -10,10 +10,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
-from coordinator.cut.cutting import Cutting
 from coordinator.cut.ground import Ground
 from coordinator.cut.room import Room
-from coordinator.cut.strips import Counted, Cut, CuttingRules, cells_wide
+from coordinator.cut.strips import Counted, Cut, Cutting, CuttingRules, cells_wide
 from coordinator.cut.window import Window
 from planner.types import GridSpec
 
@@ -145,7 +144,7 @@ class Cutter:
         left, found = ground.copy(), list[Cut]()
         for window in windows:
             cells = window.cells
-            worth = left.worth_of(cells)
+            worth = left.worth(window)
             counts_m2 = float(worth.sum())
             removed_m2 = float((left.risk[cells] * left.look[cells]).sum()) * self._cell_area_m2
             foreseen = float(worth[left.is_seen[cells]].sum()) < counts_m2 / 2
@@ -161,7 +160,7 @@ def _counted(
     out, and not flown."""
     left, found = ground.copy(), list[Counted]()
     for window in windows:
-        counts_m2 = float(left.worth_of(window.cells).sum())
+        counts_m2 = float(left.worth(window).sum())
         if least_m2 is None or counts_m2 > least_m2(window):
             found.append(Counted(window, counts_m2))
             left.fly(window)

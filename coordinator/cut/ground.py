@@ -4,14 +4,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
+from coordinator.cut.search import Counts, worth_of
 from coordinator.cut.window import Window
 from planner.types import BoolArray, FloatArray
 
 WORST = 0.3  # share of the area
-CELLS_AT_ONCE = 16_384  # that are worked on, so that they stay in the processor's cache
 
 
 @dataclass(frozen=True)
@@ -124,29 +125,22 @@ class Ground:
         risk = self.risk[self.risk > 0]
         return _worst_from(risk) if risk.size else 0.0
 
-    def worth(self) -> FloatArray:
-        """What a look at each cell counts in the objective (residual risk times m2)."""
-        worth = np.empty_like(self.risk)
-        rows = max(1, CELLS_AT_ONCE // self.risk.shape[1])
-        for first in range(0, len(worth), rows):
-            some = np.s_[first : first + rows, :]
-            worth[some] = self.worth_of(some)
-        return worth
+    @property
+    def counts(self) -> Counts:
+        """What a look counts in the objective."""
+        return Counts(self.objective.mean, self.objective.worst / WORST, self.threshold)
 
-    def worth_of(self, cells: tuple[slice, slice]) -> FloatArray:
-        """The same of some cells."""
-        risk, look = self.risk[cells], self.look[cells]
-        worth = self.objective.mean * risk
-        worth *= look
-        if self.objective.worst:
-            above = np.maximum(risk - self.threshold, 0.0)
-            above -= np.maximum(risk * (1.0 - look) - self.threshold, 0.0)
-            above *= self.objective.worst / WORST
-            worth += above
-        worth *= self.weights[cells]
-        if self.contacts is not None:
-            worth += self.contacts[0, *cells]
-        return worth
+    def worth(self, window: Window | None = None) -> FloatArray:
+        """What a look at each cell of a window, or of all, counts in the objective (residual risk times m2)."""
+        rows, columns = self.risk.shape
+        place = (0, rows, 0, columns) if window is None else window.bounds
+        contacts = _nothing(self.risk.shape) if self.contacts is None else self.contacts[0]
+        return worth_of(self.risk, self.look, self.weights, contacts, self.counts, place)
+
+
+@lru_cache(maxsize=16)
+def _nothing(shape: tuple[int, int]) -> FloatArray:
+    return np.zeros(shape)
 
 
 def _worst_from(risk: FloatArray) -> float:

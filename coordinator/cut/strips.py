@@ -1,14 +1,18 @@
-"""Strips as they are cut: what is cut of which length, what a window counts, and the rectangle that it becomes."""
+"""Cuts strips: rectangles along the tracks or across them, as wide as the helper's swath, where a second look is worth
+the most, at a price for each metre."""
 
 from __future__ import annotations
 
+import copy
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
+from coordinator.cut.ground import Ground
+from coordinator.cut.search import TOLERANCE, Costs, Left, cut, look_anew
 from coordinator.cut.window import Window
 from planner.types import GridSpec, Strip
-
-TOLERANCE = 1e-9  # relative: sums that differ by no more count as equal
 
 
 @dataclass(frozen=True)
@@ -46,6 +50,50 @@ class Cut(Counted):
     removable_m2: float
     foreseen: bool = False
     why: str = ""
+
+
+class Cutting:
+    """Ground as windows are cut of it and flown, all along the tracks, or all across them."""
+
+    def __init__(self, grid: GridSpec, ground: Ground, rules: CuttingRules, *, across: bool = False) -> None:
+        self._cell_m, self._rules, self._across = grid.cell_m, rules, across
+        self._counts = ground.counts
+        lies = ground.turned if across else ground
+        rows, columns = lies.risk.shape
+        windows = columns - min(columns, cells_wide(grid, rules.swath_m)) + 1
+        self._left = Left(
+            risk=np.array(lies.risk, order="C"),
+            look=np.ascontiguousarray(lies.look),
+            weights=np.ascontiguousarray(lies.weights),
+            contacts=np.zeros((rows, columns)) if lies.contacts is None else np.array(lies.contacts[0], order="C"),
+            worth=np.empty((rows, columns)),
+            sums=np.empty((windows, rows)),
+            first_row=np.zeros(windows, dtype=np.int64),
+            end_row=np.zeros(windows, dtype=np.int64),
+            value=np.zeros(windows),
+            is_known=np.zeros(windows, dtype=np.bool_),
+        )
+        look_anew(self._left, self._counts, 0, rows, 0, columns)
+
+    def _costs(self, price: float) -> Costs:
+        shortest = max(1, round(self._rules.min_strip_m / self._cell_m))
+        longest = max(shortest, round(self._rules.max_strip_m / self._cell_m))
+        return Costs(price * self._cell_m, price * self._rules.overhead_m, shortest, longest)
+
+    def copy(self) -> Cutting:
+        """One that may be cut by itself."""
+        new, left = copy.copy(self), self._left
+        own = {name: getattr(left, name).copy() for name in ("risk", "contacts", "worth", "sums")}
+        bands = {name: getattr(left, name).copy() for name in ("first_row", "end_row", "value", "is_known")}
+        new._left = left._replace(**own, **bands)
+        return new
+
+    def cut(self, price: float) -> list[Window]:
+        """Cuts the windows worth flying at a price for each metre flown, those first that lie side by side; one that
+        lies on another is worth a look when that has been flown. The ground is left as they leave it."""
+        self._left.is_known[:] = False
+        found = [Window(*each) for each in cut(self._left, self._counts, self._costs(price)).tolist()]
+        return [one.turned for one in found] if self._across else found
 
 
 def strip_of(grid: GridSpec, window: Window, number: int) -> Strip:

@@ -25,6 +25,11 @@ class Window:
         return slice(self.first_row, self.end_row), self.columns
 
     @property
+    def bounds(self) -> tuple[int, int, int, int]:
+        """Its first row, the one behind its last, and so its columns."""
+        return self.first_row, self.end_row, self.first_column, self.end_column
+
+    @property
     def columns(self) -> slice:
         """Its columns of the grid's arrays."""
         return slice(self.first_column, self.end_column)

@@ -17,7 +17,7 @@ Code = dict[str, str]
 """By what it is, such as a room or `numpy`, its version; of ours, and of a user's modules, a hash of what the files
 say."""
 OURS = (*ROOMS, "secondlook")
-RECKONS = ("numpy", "shapely")
+RECKONS = ("numba", "numpy", "shapely")
 KINDS = (".py", ".yaml")
 
 

@@ -1,25 +1,43 @@
-"""Cuts windows, along the tracks or across them and as wide as the helper's swath, where a second look is worth the
-most.
+"""What looks at cells count, and the search for the windows, as wide as the helper's swath, where a second look is
+worth the most. All of it is compiled.
 
 What a look is expected to bring is summed over every window as wide as the swath; each metre of a strip, and each way
 to one, has its price. Windows side by side are chosen that together bring most beyond that; their cells then count as
-if they had been flown, and the search goes on with what is left. All of that is compiled.
+if they had been flown, and the search goes on with what is left.
 """
 
 from __future__ import annotations
 
-import copy
 from typing import NamedTuple
 
 import numpy as np
 
-from coordinator.cut.ground import WORST, Ground
-from coordinator.cut.strips import TOLERANCE, CuttingRules, cells_wide
-from coordinator.cut.window import Window
 from planner.compiled import compiled
-from planner.types import BoolArray, FloatArray, GridSpec, IntArray
+from planner.types import BoolArray, FloatArray, IntArray
 
+Bounds = tuple[int, int, int, int]
+"""First row, the one behind the last, first column, the one behind the last."""
 MOST_PASSES = 6  # of the search, each over what those before have left
+TOLERANCE = 1e-9  # relative: sums that differ by no more count as equal
+
+
+class Counts(NamedTuple):
+    """What a look counts: times `mean` the risk that it removes, and times `worst` as much of it as lies above the
+    `threshold`."""
+
+    mean: float
+    worst: float
+    threshold: float
+
+
+class Costs(NamedTuple):
+    """What each row of a band costs, and each band; and the `shortest` and the `longest` strip into which one is cut,
+    in rows."""
+
+    row: float
+    band: float
+    shortest: int
+    longest: int
 
 
 class Left(NamedTuple):
@@ -43,73 +61,34 @@ class Left(NamedTuple):
     is_known: BoolArray
 
 
-class Terms(NamedTuple):
-    """`mean`: what the risk counts that a look removes; `worst`: what as much of it as lies above the `threshold` does
-    beside that. `row_cost`: what each row of a band costs; `fixed_cost`: what each band does. `shortest`,
-    `longest`: of the strips into which a band is cut, in rows."""
-
-    mean: float
-    worst: float
-    threshold: float
-    row_cost: float
-    fixed_cost: float
-    shortest: int
-    longest: int
-
-
-class Cutting:
-    """Ground as windows are cut of it and flown, all along the tracks, or all across them."""
-
-    def __init__(self, grid: GridSpec, ground: Ground, rules: CuttingRules, *, across: bool = False) -> None:
-        self._cell_m, self._rules, self._across = grid.cell_m, rules, across
-        self._objective, self._threshold = ground.objective, ground.threshold
-        lies = ground.turned if across else ground
-        rows, columns = lies.risk.shape
-        windows = columns - min(columns, cells_wide(grid, rules.swath_m)) + 1
-        self._left = Left(
-            risk=np.array(lies.risk, order="C"),
-            look=np.ascontiguousarray(lies.look),
-            weights=np.ascontiguousarray(lies.weights),
-            contacts=np.zeros((rows, columns)) if lies.contacts is None else np.array(lies.contacts[0], order="C"),
-            worth=np.empty((rows, columns)),
-            sums=np.empty((windows, rows)),
-            first_row=np.zeros(windows, dtype=np.int64),
-            end_row=np.zeros(windows, dtype=np.int64),
-            value=np.zeros(windows),
-            is_known=np.zeros(windows, dtype=np.bool_),
-        )
-        _look_anew(self._left, self._terms(0.0), 0, rows, 0, columns)
-
-    def _terms(self, price: float) -> Terms:
-        shortest = max(1, round(self._rules.min_strip_m / self._cell_m))
-        longest = max(shortest, round(self._rules.max_strip_m / self._cell_m))
-        mean, worst, overhead_m = self._objective.mean, self._objective.worst / WORST, self._rules.overhead_m
-        return Terms(mean, worst, self._threshold, price * self._cell_m, price * overhead_m, shortest, longest)
-
-    def copy(self) -> Cutting:
-        """One that may be cut by itself."""
-        new, left = copy.copy(self), self._left
-        own = {name: getattr(left, name).copy() for name in ("risk", "contacts", "worth", "sums")}
-        bands = {name: getattr(left, name).copy() for name in ("first_row", "end_row", "value", "is_known")}
-        new._left = left._replace(**own, **bands)
-        return new
-
-    def cut(self, price: float) -> list[Window]:
-        """Cuts the windows worth flying at a price for each metre flown, those first that lie side by side; one that
-        lies on another is worth a look when that has been flown. The ground is left as they leave it."""
-        self._left.is_known[:] = False
-        found = [Window(*each) for each in _cut(self._left, self._terms(price)).tolist()]
-        return [one.turned for one in found] if self._across else found
+@compiled
+def worth_of(
+    risk: FloatArray, look: FloatArray, weights: FloatArray, contacts: FloatArray, counts: Counts, window: Bounds
+) -> FloatArray:
+    """What a look at each cell of a window counts."""
+    first_row, end_row, first_column, end_column = window
+    worth = np.empty((end_row - first_row, end_column - first_column))
+    for row in range(worth.shape[0]):
+        for column in range(worth.shape[1]):
+            at = first_row + row, first_column + column
+            worth[row, column] = _worth(risk[at], look[at], weights[at], contacts[at], counts)
+    return worth
 
 
 @compiled
-def _cut(left: Left, terms: Terms) -> IntArray:
+def _worth(risk: float, look: float, weight: float, contact: float, counts: Counts) -> float:
+    above = max(risk - counts.threshold, 0.0) - max(risk * (1.0 - look) - counts.threshold, 0.0)
+    return (counts.mean * risk * look + above * counts.worst) * weight + contact
+
+
+@compiled
+def cut(left: Left, counts: Counts, costs: Costs) -> IntArray:
     """The windows that are cut, shape (n, 4): first row, the one behind the last, and so their columns."""
     (rows, columns), (windows,) = left.risk.shape, left.value.shape
-    most = (windows // (columns - windows + 1) + 1) * (rows // terms.shortest + 1)
+    most = (windows // (columns - windows + 1) + 1) * (rows // costs.shortest + 1)
     found, count = np.empty((MOST_PASSES * most, 4), np.int64), np.zeros(MOST_PASSES + 1, np.int64)
     for turn in range(MOST_PASSES):
-        count[turn + 1] = _side_by_side(left, terms, found, count[turn])
+        count[turn + 1] = _side_by_side(left, costs, found, count[turn])
         if count[turn + 1] == count[turn]:
             return found[: count[turn]]
         for first_row, end_row, first_column, end_column in found[count[turn] : count[turn + 1]]:
@@ -117,20 +96,18 @@ def _cut(left: Left, terms: Terms) -> IntArray:
                 for column in range(first_column, end_column):
                     left.risk[row, column] *= 1.0 - left.look[row, column]
                     left.contacts[row, column] = 0.0
-            _look_anew(left, terms, first_row, end_row, first_column, end_column)
+            look_anew(left, counts, first_row, end_row, first_column, end_column)
     return found[: count[-1]]
 
 
 @compiled
-def _look_anew(left: Left, terms: Terms, first_row: int, end_row: int, first_column: int, end_column: int) -> None:
+def look_anew(left: Left, counts: Counts, first_row: int, end_row: int, first_column: int, end_column: int) -> None:
     """Works out what looks at some cells are worth, and what hangs on it."""
     windows, width = left.value.size, left.risk.shape[1] - left.value.size + 1
     for row in range(first_row, end_row):
         for column in range(first_column, end_column):
-            risk, look = left.risk[row, column], left.look[row, column]
-            above = max(risk - terms.threshold, 0.0) - max(risk * (1.0 - look) - terms.threshold, 0.0)
-            worth = (terms.mean * risk * look + above * terms.worst) * left.weights[row, column]
-            left.worth[row, column] = worth + left.contacts[row, column]
+            at = row, column
+            left.worth[at] = _worth(left.risk[at], left.look[at], left.weights[at], left.contacts[at], counts)
         for window in range(max(first_column - width + 1, 0), min(end_column, windows)):
             total = left.worth[row, window]
             for column in range(window + 1, window + width):
@@ -141,40 +118,40 @@ def _look_anew(left: Left, terms: Terms, first_row: int, end_row: int, first_col
 
 
 @compiled
-def _side_by_side(left: Left, terms: Terms, found: IntArray, count: int) -> int:
+def _side_by_side(left: Left, costs: Costs, found: IntArray, count: int) -> int:
     """Puts behind the first so many the windows that do not overlap which together are worth most beyond their costs,
     best first, each cut into strips; returns how many there are then.
 
     Each is moved to the middle of what it holds, where it may overlap the next one on what holds nothing, or is flown
     over twice.
     """
-    _find_bands(left, terms)
+    _find_bands(left, costs)
     width = left.risk.shape[1] - left.value.size + 1
-    profits = left.value - terms.fixed_cost
+    profits = left.value - costs.band
     for window in _best_apart(profits, width):
         first, end = left.first_row[window], left.end_row[window]
         column = _centred(left.worth, first, end, window, width)
-        edges = _edges(first, end, terms.shortest, terms.longest)
+        edges = _edges(first, end, costs.shortest, costs.longest)
         for piece in range(edges.size - 1):
-            begin, behind, counts = edges[piece], edges[piece + 1], 0.0
+            begin, behind, brings = edges[piece], edges[piece + 1], 0.0
             for row in range(begin, behind):
                 for its_column in range(column, column + width):
-                    counts += left.worth[row, its_column]
-            if counts > ((behind - begin) * terms.row_cost + terms.fixed_cost) * (1.0 + TOLERANCE):
+                    brings += left.worth[row, its_column]
+            if brings > ((behind - begin) * costs.row + costs.band) * (1.0 + TOLERANCE):
                 found[count] = begin, behind, column, column + width
                 count += 1
     return count
 
 
 @compiled
-def _find_bands(left: Left, terms: Terms) -> None:
+def _find_bands(left: Left, costs: Costs) -> None:
     """Finds the best band of each window of columns, where it is not known."""
     for window in range(left.value.size):
         if not left.is_known[window]:
             total = lowest = promising = left.value[window] = 0.0
             lowest_row = 0
             for row in range(left.sums.shape[1]):
-                profit = left.sums[window, row] - terms.row_cost
+                profit = left.sums[window, row] - costs.row
                 promising += max(profit, 0.0)
                 total += profit
                 if total < lowest:
@@ -183,7 +160,7 @@ def _find_bands(left: Left, terms: Terms) -> None:
                     left.value[window] = total - lowest
                     left.first_row[window], left.end_row[window] = lowest_row, row + 1
             # No band brings more than all rows that bring anything.
-            if promising <= terms.fixed_cost * (1.0 + TOLERANCE):
+            if promising <= costs.band * (1.0 + TOLERANCE):
                 left.value[window] = 0.0
             left.is_known[window] = True
 
