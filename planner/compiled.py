@@ -42,6 +42,10 @@ class Compiled(Generic[P, R]):
         """For how many sorts of arguments it has been compiled so far; of each it takes seconds."""
         return len(getattr(self._made, "signatures", ()))
 
+    def called_with(self, sample: Callable[[], tuple[Any, ...]]) -> None:
+        """Tells what it is called with from without: arguments of just these types. See `compile_all`."""
+        _called.append((self, sample))
+
     def _make(self) -> Any:
         import numba  # noqa: PLC0415, see the class
 
@@ -55,6 +59,17 @@ class Compiled(Generic[P, R]):
 def compiled(function: Callable[P, R]) -> Compiled[P, R]:
     """Has a function compiled."""
     return Compiled(function)
+
+
+_called: list[tuple[Compiled[..., Any], Callable[[], tuple[Any, ...]]]] = []
+
+
+def compile_all() -> None:
+    """Compiles what is called from without of all modules that are loaded, or reads it from disk: so that nobody waits
+    for that once time matters. The first time on a machine it takes some ten seconds."""
+    while _called:
+        one, sample = _called.pop()
+        one(*sample())
 
 
 def _make_all(names: dict[str, Any]) -> None:

@@ -199,6 +199,9 @@ def _lengths_m(starts: FloatArray, ends: FloatArray, turn_radius_m: float) -> Fl
     return lengths_m
 
 
+_lengths_m.called_with(lambda: (np.zeros((1, 3)), np.zeros((1, 3)), 1.0))
+
+
 @compiled
 def _in_radii(poses: FloatArray, turn_radius_m: float) -> FloatArray:
     """Of each pose where it is in turn radii, the heading counterclockwise from east, and the compass heading's cosine

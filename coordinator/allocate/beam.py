@@ -75,8 +75,17 @@ class Ahead(NamedTuple):
 def best_routes(team: Found, beam: int) -> list[list[int]]:
     """Of each helper of a team the strips it is to serve, in order, by their places. `beam`: so many plans are carried
     from one strip to the next."""
+    routes: list[list[int]] = [[] for _ in team.free_s]
+    turns = _search(team, *_room(team, beam), beam).tolist()
+    for turn, place in sorted((turn, place) for place, turn in enumerate(turns) if turn != NONE):
+        routes[turn % len(routes)].append(place)
+    return routes
+
+
+def _room(team: Found, beam: int) -> tuple[Plans, Ahead]:
+    """For all plans that a search may come to, in which nobody has begun, and for what they may go on with."""
     nodes, helpers, strips = team.table.shape[1], team.free_s.size, team.rank.size
-    most = 2 + beam * (strips + helpers + 1)
+    most = 2 + beam * (strips + helpers + 1)  # each turn serves a strip, or ends a helper; the last is to work on
     plans = Plans(
         np.full((most, helpers), nodes - 1),
         np.zeros((most, helpers), dtype=np.bool_),
@@ -84,11 +93,7 @@ def best_routes(team: Found, beam: int) -> list[list[int]]:
         np.full((most, strips), NONE),
         np.zeros(most),
     )
-    turns = _search(team, plans, Ahead(*np.empty((3, beam, strips))), beam).tolist()
-    routes: list[list[int]] = [[] for _ in range(helpers)]
-    for turn, place in sorted((turn, place) for place, turn in enumerate(turns) if turn != NONE):
-        routes[turn % helpers].append(place)
-    return routes
+    return plans, Ahead(*np.empty((3, beam, strips)))
 
 
 @compiled
@@ -125,6 +130,16 @@ def _search(team: Found, plans: Plans, ahead: Ahead, beam: int) -> IntArray:
             spare.is_done[one] = False
         _complete(team, spare, ahead_of_spare, turn)
     return spare.turn
+
+
+def _sample() -> tuple[Found, Plans, Ahead, int]:
+    one, first = np.ones(1), np.zeros(1, dtype=np.int64)
+    table, way = np.ones((1, 2, 4, 1)), np.zeros((1, 2, 1), dtype=np.int64)
+    team = Found(table, way, one, one, one, one, 1.0, one, one, one, first, first, 1.0, 1.0)
+    return team, *_room(team, 1), 1
+
+
+_search.called_with(_sample)
 
 
 @compiled

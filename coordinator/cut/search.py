@@ -117,6 +117,19 @@ def look_anew(left: Left, counts: Counts, first_row: int, end_row: int, first_co
         left.is_known[window] = False
 
 
+def _left() -> Left:
+    risk, look, weights, contacts, worth, sums = np.ones((6, 1, 1))
+    first_row, end_row = np.zeros((2, 1), dtype=np.int64)
+    is_known = np.zeros(1, dtype=np.bool_)
+    return Left(risk, look, weights, contacts, worth, sums, first_row, end_row, np.zeros(1), is_known)
+
+
+_COUNTS = Counts(1.0, 1.0, 1.0)
+worth_of.called_with(lambda: (*np.ones((4, 1, 1)), _COUNTS, (0, 1, 0, 1)))
+look_anew.called_with(lambda: (_left(), _COUNTS, 0, 1, 0, 1))
+cut.called_with(lambda: (_left(), _COUNTS, Costs(1.0, 1.0, 1, 1)))
+
+
 @compiled
 def _side_by_side(left: Left, costs: Costs, found: IntArray, count: int) -> int:
     """Puts behind the first so many the windows that do not overlap which together are worth most beyond their costs,

@@ -20,6 +20,7 @@ from comms.keys import HostSpec
 from comms.runner import failure_of
 from comms.said.announcement import Role
 from comms.said.routing import RosterNode, modem_of
+from planner.compiled import compile_all
 
 CLOCK, WORLD, COORDINATOR, RECORDER, OBSERVER = (
     role.value for role in (Role.CLOCK, Role.WORLD, Role.COORDINATOR, Role.RECORDER, Role.OBSERVER)
@@ -84,9 +85,13 @@ def node_spec(role: Role, config: Any, own: str | None = None) -> NodeSpec:
 
 
 def make_node(node_id: str, spec: NodeSpec) -> Any:
-    """The node itself; raises NodeError where it cannot be made."""
+    """The node itself; raises NodeError where it cannot be made. What the coordinator calls is compiled then; vehicles
+    call so little of that that they do not load it before."""
     try:
-        return spec.make()
+        node = spec.make()
+        if spec.factory == NODES[Role.COORDINATOR].factory:
+            compile_all()
+        return node
     except (NodeError, *NO_FAILURES):
         raise
     except BaseException as error:
@@ -96,6 +101,14 @@ def make_node(node_id: str, spec: NodeSpec) -> Any:
 def make_nodes(specs: Mapping[str, NodeSpec]) -> dict[str, Any]:
     """The nodes by their ids; raises NodeError for one that cannot be made."""
     return {node_id: make_node(node_id, spec) for node_id, spec in specs.items()}
+
+
+def compile_nodes() -> None:
+    """Compiles what nodes of ours call: for who sets up a machine, so that nobody waits later."""
+    for row in NODES.values():
+        if row.factory:
+            import_module(row.factory.partition(":")[0])
+    compile_all()
 
 
 def hosts_of_run(
