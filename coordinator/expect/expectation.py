@@ -67,11 +67,12 @@ class ExpectedMap:
         primaries, helpers, largest_levels = self._told_so_far()
         share, helpers_share = self._seabed.shares(primaries, tracks.flown)
         nats = primaries + helpers + share * tracks.ahead
-        look_nats = -np.log1p(-np.minimum(self._p_detect * helpers_share, HIGHEST_P_DETECT))
+        look = np.minimum(self._p_detect * helpers_share, HIGHEST_P_DETECT)
         if rho > 0:  # the largest single look counts for more, and of another what it adds to that
             largest = np.maximum(NATS_PER_LEVEL * largest_levels, share * tracks.largest_ahead)
             nats = largest * rho + nats * (1 - rho)
-            look_nats = np.maximum(look_nats - largest, 0.0) * rho + look_nats * (1 - rho)
+            look_nats = -np.log1p(-look)
+            look = -np.expm1(-np.maximum(look_nats - largest, 0.0) * rho - look_nats * (1 - rho))
         settled = fleet.map.settled_by(fleet.primaries, self._place.cells)
         hot, told_risk = self.hotspots.drawn()
         has_tiles = settled | (primaries + helpers > 0)
@@ -80,7 +81,7 @@ class ExpectedMap:
         plans_are_known = all(one.plan is not None for one in fleet.primaries.values())
         return Expectation(
             risk=np.where(self._inside & (is_seen | plans_are_known), risk, 0.0),
-            look=rounded(-np.expm1(-look_nats)),
+            look=rounded(look),
             is_seen=is_seen,
         )
 

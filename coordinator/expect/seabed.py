@@ -32,7 +32,8 @@ class Seabed:
         self._cells = max(0, round(ABOUT_M / grid.cell_m))
         self._found: FloatArray = np.zeros(grid.shape)
         self._told: FloatArray = np.zeros(grid.shape)
-        self._learnt_about: tuple[FloatArray, FloatArray] | None = None  # the means about each cell of both, if known
+        self._has_learnt = False
+        self._learnt_about: tuple[FloatArray, FloatArray] | None = None
 
     def learn(self, window: Window, p_detect: FloatArray, typical: float) -> None:
         """Learns from a pass of a helper over a window's cells: the P_d that it found at each, shape of the window, 0
@@ -40,7 +41,7 @@ class Seabed:
         seen = p_detect > 0
         self._found[window.cells][seen] += p_detect[seen]
         self._told[window.cells][seen] += typical
-        self._learnt_about = None
+        self._has_learnt, self._learnt_about = True, None
 
     def shares(self, found_nats: FloatArray, expected_nats: FloatArray) -> tuple[FloatArray, FloatArray]:
         """What part of the P_d expected of a look is expected to be found, grid shape: of a primary's by its P(y), and
@@ -52,22 +53,40 @@ class Seabed:
         expected = -np.expm1(-expected_nats)
         found = np.where(expected_nats > 0, -np.expm1(-found_nats), 0.0)
         found_about, told_about = self._about(found), self._about(expected)
-        by_tracks = (found_about + DOUBT) / (told_about + DOUBT)
-        told = float((self._told * by_tracks).sum())
+        told, learnt_found, learnt_told = 0.0, *self._learnt()
+        if self._has_learnt:
+            told = float((self._told * ((found_about + DOUBT) / (told_about + DOUBT))).sum())
         doubt = DOUBT_OF_HELPERS * self._found.size
         of_helpers = (float(self._found.sum()) + doubt) / (told + doubt)
+        return _shares(found_about, told_about, learnt_found, learnt_told, of_helpers)
+
+    def _learnt(self) -> tuple[FloatArray, FloatArray]:
+        """The means about each cell of what helpers found, and of what they were told to."""
         if self._learnt_about is None:
             self._learnt_about = self._about(self._found), self._about(self._told)
-        found_about += self._learnt_about[0] / of_helpers
-        told_about += self._learnt_about[1]
-        share = np.clip((found_about + DOUBT) / (told_about + DOUBT), LEAST_SHARE, 1 / LEAST_SHARE)
-        return share, np.minimum(of_helpers * share, MOST_OF_TOLD)
+        return self._learnt_about
 
     def _about(self, values: FloatArray) -> FloatArray:
         """The mean over the cells about each, of those that there are."""
-        for axis in (0, 1):
-            values = sliding_mean(values, self._cells, axis)
-        return values
+        return sliding_mean(sliding_mean(values, self._cells, 0), self._cells, 1)
+
+
+@compiled
+def _shares(
+    found: FloatArray, told: FloatArray, learnt_found: FloatArray, learnt_told: FloatArray, of_helpers: float
+) -> tuple[FloatArray, FloatArray]:
+    """What part of a primary's look is expected to be found, and of a helper's."""
+    by_tracks, by_helpers = np.empty(found.shape), np.empty(found.shape)
+    for row in range(found.shape[0]):
+        for column in range(found.shape[1]):
+            all_found = found[row, column] + learnt_found[row, column] / of_helpers
+            all_told = told[row, column] + learnt_told[row, column]
+            share = min(max((all_found + DOUBT) / (all_told + DOUBT), LEAST_SHARE), 1.0 / LEAST_SHARE)
+            by_tracks[row, column], by_helpers[row, column] = share, min(of_helpers * share, MOST_OF_TOLD)
+    return by_tracks, by_helpers
+
+
+_shares.called_with(lambda: (*np.zeros((4, 1, 1)), 1.0))
 
 
 def sliding_mean(values: FloatArray, beside: int, axis: int) -> FloatArray:
