@@ -586,11 +586,9 @@ class TestSearch:
         assert best_routes(team._replace(later_m2ps=0.0), 3) == [[best]]
 
 
+@pytest.mark.skipif(not hasattr(_search, "signatures"), reason="nothing is compiled, by NUMBA_DISABLE_JIT")
 def test_for_teams_of_all_kinds_the_search_is_compiled_once() -> None:
     """A second time would cost seconds, of the first offer of that kind."""
-    signatures = getattr(_search, "signatures", None)
-    if signatures is None:
-        pytest.skip("nothing is compiled: NUMBA_DISABLE_JIT is set")
     home = WayHome((0.0, 0.0), Sailing(2.0, drift_mps=0.5, set_rad=0.0), 6.0)
     kinds = (
         [helper()],
