@@ -20,7 +20,7 @@ def compiled(function: Callable[P, R]) -> Callable[P, R]:
     """Compiles a function, the first time that it is called, and keeps what comes of it on disk beside the source, or
     in the user's cache where that may not be written to.
 
-    It may call such functions of its own file alone: what is kept is made anew as its own file changes, and would go
-    on with what another file had once.
+    It may call such functions of its own file alone, and use constants of that: what is kept is made anew as its own
+    file changes, and would go on with what another file had once.
     """
     return cast(Callable[P, R], numba.njit(cache=True)(function))

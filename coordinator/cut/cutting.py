@@ -14,12 +14,13 @@ from typing import NamedTuple
 import numpy as np
 
 from coordinator.cut.ground import WORST, Ground
-from coordinator.cut.strips import TOLERANCE, CuttingRules, cells_wide
+from coordinator.cut.strips import CuttingRules, cells_wide
 from coordinator.cut.window import Window
 from planner.compiled import compiled
 from planner.types import BoolArray, FloatArray, GridSpec, IntArray
 
 MOST_PASSES = 6  # of the search, each over what those before have left
+TOLERANCE = 1e-9  # relative: sums that differ by no more count as equal
 
 
 class Left(NamedTuple):

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from coordinator.cut.window import Window
 from planner.types import GridSpec, Strip
 
-TOLERANCE = 1e-9  # relative: sums that differ by no more count as equal
+ROUNDING = 1e-9  # of a cell
 
 
 @dataclass(frozen=True)
@@ -63,4 +63,4 @@ def strip_of(grid: GridSpec, window: Window, number: int) -> Strip:
 
 def cells_wide(grid: GridSpec, swath_m: float) -> int:
     """Whole cells that a swath covers side by side, at least one."""
-    return max(1, math.floor(swath_m / grid.cell_m + TOLERANCE))
+    return max(1, math.floor(swath_m / grid.cell_m + ROUNDING))

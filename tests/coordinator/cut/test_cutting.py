@@ -466,10 +466,10 @@ class TestSideBySide:
     columns=st.lists(st.integers(1, 9), min_size=4, max_size=12),
     width=st.integers(1, 4),
     row_cost=st.sampled_from([2.0, 3.0, 4.0]),
-    fixed_cost=st.integers(0, 8),
+    fixed_cost=st.integers(0, 8).map(float),
 )
 def test_no_other_choice_of_windows_that_do_not_overlap_brings_more(
-    columns: list[int], width: int, row_cost: float, fixed_cost: int
+    columns: list[int], width: int, row_cost: float, fixed_cost: float
 ) -> None:
     rows = 3
     worth = np.array([columns], dtype=np.float64).repeat(rows, axis=0)
