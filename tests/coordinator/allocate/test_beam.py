@@ -193,7 +193,7 @@ class TestAhead:
         assert ahead.gained_m2[0] == pytest.approx([700 * 0.6 - (150 - 40) * 2])
 
     def test_what_takes_more_than_it_brings_is_not_gone_on_with(self) -> None:
-        found = Team([NEAR], [ALPHA], 3600.0).found(np.array([700 / 152.5 + 0.01]))
+        found = Team([NEAR], [ALPHA], 3600.0).found(np.array([700 / 152.5 + 0.001]))
         plans = begun(found)
         nexts, ahead = look_ahead(found, plans)
         assert nexts == [NONE]
@@ -248,6 +248,7 @@ class TestAhead:
             ([0, 600, 600], [1, 152, 152], 1),  # of equals the first
             ([0, 0, 1e-6], [1, 1, 1e5], 2),
             ([1, 4, 2], [1e-12, 0, 0], 1),  # no time at all is as a little
+            ([3, 2, 0], [1, 0.5, 1], 1),
         ],
     )
     def test_most_a_second_is_by_the_time_that_is_spent(
@@ -333,6 +334,17 @@ class TestWhatPlansCount:
         told = still_m2(team, plans, nexts, ahead)
         assert told[0, can] == pytest.approx(np.array([*expected, 0.0])[can])
 
+    def test_so_it_may_where_who_goes_on_has_hardly_any_time(self) -> None:
+        team = found_by(JOBS, [helper(), BETA])
+        team.table[0, -1, 0] = 0.0  # alpha is where it is to begin
+        plans = begun(team)
+        plans.free_s[0] = DEADLINE_S - 0.25, DEADLINE_S - 0.2
+        nexts, ahead = look_ahead(team, plans)
+        assert nexts == [0]
+        told = still_m2(team, plans, nexts, ahead)
+        assert told[0, -1] == pytest.approx(brings(team, 0.2))
+        assert told[0, 0] == pytest.approx(brings(team, 0.2, 0))
+
     def test_behind_all_strips_time_is_worth_what_it_is_later_for_four_hours(self) -> None:
         team = both()
         assert (team.later_s, team.later_m2ps > 0) == (HORIZON_S, True)
@@ -404,6 +416,13 @@ class TestGrown:
         by = [plans.turn[row].argmax() for row in range(1, 1 + count)]
         assert sorted(by) == np.flatnonzero(ahead.gained_m2[0] > 0).tolist()
         assert count > 1
+
+    @pytest.mark.parametrize("risk_m2", [1.0, 1e-3])
+    def test_with_hardly_anything_they_go_on_all_the_same(self, risk_m2: float) -> None:
+        team = found_by([replace(NEAR, risk_m2=risk_m2)], [helper(), helper("beta")])
+        plans = begun(team, 1, room=9)
+        assert self.grown(team, plans, 1, 9) == 2  # by the strip, and without who is next
+        assert sorted(plans.gained_m2[1:3].tolist()) == pytest.approx([0, 0.7 * risk_m2])
 
     def test_where_nothing_can_be_gained_there_are_none(self) -> None:
         team = found_by(JOBS, [replace(ALPHA, free_s=DEADLINE_S), replace(BETA, free_s=DEADLINE_S)])
@@ -572,7 +591,10 @@ class TestSearch:
 
     @pytest.mark.parametrize(
         ("counts_m2", "best"),
-        [([5, 7, 7], 1), ([5, 7, 7 + 1e-7], 2), ([5, 5, 5 + 1e-7], 0), ([5, 5.1, 5], 1), ([5, 5, 5.1], 2)],
+        [
+            *[([5, 7, 7], 1), ([5, 7, 7 + 1e-7], 2), ([5, 5, 5 + 1e-7], 0), ([5, 5.1, 5], 1), ([5, 5, 5.1], 2)],
+            ([5, 5, 5 + 1e-6], 0),  # just so much is hardly anything
+        ],
     )
     def test_of_plans_that_hardly_differ_that_of_an_earlier_beam_is_taken(
         self, counts_m2: list[float], best: int
