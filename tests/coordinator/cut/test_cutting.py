@@ -204,6 +204,14 @@ class TestLengths:
     def test_where_the_most_is_less_than_the_least_all_are_as_long_as_that(self) -> None:
         assert cut(hot(np.s_[10:16, 10:20]), replace(RULES, overhead_m=1, max_strip_m=5)) == [Window(10, 16, 10, 20)]
 
+    def test_as_many_are_cut_as_there_are_cells_six_times(self) -> None:
+        grid = GridSpec(EAST, 5, 10, 10)
+        told = ground(np.ones(grid.shape), grid, look=0.1)
+        rules = CuttingRules(swath_m=5, overhead_m=1, min_strip_m=5, max_strip_m=5)
+        found = Cutting(grid, told, rules).cut(0.01)
+        assert len(found) == 600
+        assert len({*found}) == 100
+
     def test_a_place_is_cut_six_times_at_most(self) -> None:
         told = ground(hot(np.s_[10:40, 10:20]), look=0.1)
         assert Cutting(GRID, told, RULES).cut(0.1) == [Window(10, 40, 10, 20)] * 6
@@ -390,6 +398,15 @@ class TestSideBySide:
         worth = np.array([[9.0], [9.0], [0.0], [9.0]])  # less 3 a row: 6, 6, -3, 6
         assert side_by_side(worth, 1, 3.0, 0.0) == [Window(0, 4, 0, 1)]
         assert side_by_side(worth, 1, 5.0, 0.0) == [Window(0, 2, 0, 1)]  # 4, 4, -5, 4
+
+    def test_of_bands_that_bring_as_much_it_is_that_which_begins_and_ends_first(self) -> None:
+        assert side_by_side(np.array([[1.0], [3.0], [5.0]]), 1, 3.0, 0.0) == [Window(1, 3, 0, 1)]  # less 3: -2, 0, 2
+        assert side_by_side(np.array([[5.0], [3.0], [1.0]]), 1, 3.0, 0.0) == [Window(0, 1, 0, 1)]
+        assert side_by_side(np.array([[5.0], [0.0], [6.0], [3.0]]), 1, 3.0, 0.0) == [Window(2, 3, 0, 1)]  # 2, -3, 3, 0
+
+    def test_one_is_moved_over_what_another_holds(self) -> None:
+        worth = np.array([[5.0, 5.0, 1.0, 0.0]])
+        assert side_by_side(worth, 2, 0.5, 0.0) == [Window(0, 1, 0, 2), Window(0, 1, 1, 3)]
 
     def test_they_are_moved_to_the_middle_of_what_they_hold(self) -> None:
         worth = np.zeros((3, 12))
