@@ -239,6 +239,8 @@ class TestAhead:
         team = found_by([replace(NEAR, risk_m2=1.0)], [ALPHA])
         nexts, ahead = look_ahead(team, begun(team))
         assert (nexts, (ahead.gained_m2 > 0).tolist()) == ([0], [[True]])
+        time_s = DEADLINE_S - ahead.ends_s[0, 0]
+        assert still_m2(team, begun(team), nexts, ahead)[0] == pytest.approx([brings(team, time_s, 0), 0])
 
     @pytest.mark.parametrize(
         ("gained_m2", "spent_s", "most"),
