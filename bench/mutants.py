@@ -139,8 +139,13 @@ def unchanged(tests: Sequence[str]) -> str:
 
 
 def tried(mutant: Mutant, *, by_all: bool) -> WorkResult:
-    """What came of it: against its own tests, then against those nearby, and `by_all` of its room."""
+    """What came of it: against its own tests, then against those nearby, and `by_all` of its room.
+
+    Where the file is compiled, Python runs it as it stands: to compile it takes longer than its tests do, and compiled
+    it would go on with whatever lies beyond an array's end.
+    """
     with use_mutation(Path(mutant.file), get_operator(mutant.operator)(), mutant.occurrence) as (was, becomes):
+        os.environ["NUMBA_DISABLE_JIT"] = "1" if "@compiled" in was else "0"
         for tests, limit_s in zip(tried_against(mutant.file, Path.cwd())[: 3 if by_all else 2], LIMITS_S, strict=False):
             if (told := said_of(tests, limit_s)) != "passed":
                 break

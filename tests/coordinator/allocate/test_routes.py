@@ -15,12 +15,12 @@ from situations import at_work, helper, open_strip, situation, situations, strip
 
 from bench.planning_time import situation as large_situation
 from coordinator import allocate
-from coordinator.allocate.plans import LEAST_S, Plans
+from coordinator.allocate.beam import LEAST_S
 from coordinator.allocate.routes import BEAM, Routes, RoutesAllocator, plan_each, plan_routes
 from coordinator.allocate.service import StripTable, expected_service, removed_m2
 from coordinator.allocate.simple import GreedyAllocator
 from coordinator.allocate.situation import HORIZON_S, Helper, OpenStrip, Situation
-from coordinator.allocate.team import MOST_STRIPS, Team, Teams
+from coordinator.allocate.team import MOST_STRIPS, Team
 from planner.currents import Sailing
 from planner.dubins import Pose
 from planner.way_home import WayHome
@@ -167,40 +167,6 @@ class TestOneHelper:
 class TestWhatIsPromising:
     """What beams are chosen by."""
 
-    THIRD = open_strip(strip(3, x_m=300, y_m=100))
-
-    @pytest.mark.parametrize("deadline_s", [3600.0, 300.0, 200.0])
-    def test_the_strips_left_bring_what_they_do_by_themselves_and_then_a_second_what_the_worst_does_by_half(
-        self, deadline_s: float
-    ) -> None:
-        poor = replace(FAR, risk_m2=500)
-        team = Team([NEAR, poor], [helper(), helper("beta", x_m=5000, free_s=100)], deadline_s)
-        assert team.alone_m2.tolist() == [350, 700]  # by number: the far one is 1
-        assert team.by_rate.tolist() == [1, 0]
-        assert team.later_m2ps == pytest.approx(0.5 * 350 / team.alone_s[0])
-        teams = Teams([team])
-        plan = Plans.begun(teams)
-        still_m2 = plan._still_m2(teams, plan.ahead(teams))
-
-        def brings(time_s: float, *left: int) -> float:
-            total_m2 = 0.0
-            for place in left:
-                share = min(1.0, time_s / team.alone_s[place])
-                total_m2, time_s = total_m2 + share * team.alone_m2[place], time_s - share * team.alone_s[place]
-            return total_m2 + time_s * team.later_m2ps
-
-        beta_s = deadline_s - 100
-        expected = [
-            brings(max(0.0, deadline_s - 402.5) + beta_s, 1),  # alpha at the far one until 402.5 s
-            brings(max(0.0, deadline_s - 152.5) + beta_s, 0),  # at the near one until 152.5 s
-            brings(beta_s, 1, 0),  # alpha leaves the rest to beta
-        ]
-        assert still_m2[0] == pytest.approx(expected)
-        plan.is_done[0, 1] = True  # beta has no time any more
-        still_m2 = plan._still_m2(teams, plan.ahead(teams))
-        expected = [brings(max(0.0, deadline_s - free_s), left) for free_s, left in ((402.5, 1), (152.5, 0))]
-        assert still_m2[0] == pytest.approx([*expected, 0.0])
-
     def test_what_is_begun_after_the_deadline_brings_nothing(self) -> None:
         # By number the far one is the first. Behind it nothing is left of the time.
         removed, left_s, shares = Team([NEAR, FAR], [helper(), helper("beta")], 250).flown([[1, 0], []])
@@ -220,29 +186,11 @@ class TestWhatIsPromising:
         along = WayHome((0.0, 0.0), Sailing(2.0, drift_mps=0.5, set_rad=0.0), 6.0)
         assert Team([NEAR], [helper(way_home=along)], 3600).alone_s == pytest.approx([80 + 40])
 
-    @pytest.mark.parametrize(
-        ("counts_m2", "best"), [([5, 7, 7, 3, 7 + 1e-7], 1), ([5, 7, 7, 3, 7.1], 4), ([5, 4, 3, 2, 1], 0)]
-    )
-    def test_of_plans_that_hardly_differ_that_of_an_earlier_beam_is_taken(
-        self, counts_m2: list[float], best: int
-    ) -> None:
-        assert allocate.routes._best(np.array(counts_m2), [3, 2]) == best
-
     def test_what_the_deadline_cuts_off_takes_no_time(self) -> None:
         # By 200 s the near one brings 700 m2 in 152.5 s, the long one more than twice as much in 200 s.
         long = open_strip(strip(1, x_m=0, y_m=-200, length_m=2000, heading_rad=math.pi), 20_000)
         found = plan_routes([NEAR, long], [helper()], 200, 1)
         assert found.strips == {"alpha": (1,)}
-
-    def test_plans_that_serve_the_same_strips_and_end_at_the_same_places_are_one(self) -> None:
-        teams = Teams([Team([NEAR, FAR, self.THIRD], [helper()], 3600.0)] * 2)
-        plans = Plans.begun(teams).chosen(np.array([0, 0, 0, 0, 1]))
-        plans.nodes[:] = 4
-        plans.turn[:] = [[0, -1, 1], [1, -1, 0], [-1, 0, 1], [0, 1, -1], [0, -1, 1]]
-        assert plans.first_that_differ(teams, 10).tolist() == [0, 2, 3, 4]
-        assert plans.first_that_differ(teams, 2).tolist() == [0, 2, 4]
-        plans.nodes[1], plans.is_done[3] = 5, True
-        assert plans.first_that_differ(teams, 10).tolist() == [0, 1, 2, 3, 4]
 
 
 class TestSeveralHelpers:
@@ -373,6 +321,16 @@ class TestTimeToSpare:
         assert priced.counts_m2 == pytest.approx(700 + (3600 - 402.5) * second_m2)
         assert plain.counts_m2 == plain.removed_m2 == pytest.approx(840)
 
+    def test_of_several_choices_the_first_with_strips_tells_what_it_is_worth(self) -> None:
+        choices: list[tuple[list[OpenStrip], list[Helper]]] = [
+            (jobs, [helper()]) for jobs in ([], [NEAR], [NEAR, FAR], [])
+        ]
+        (second_m2,) = Team([NEAR], [helper()], 3600.0).time_m2ps(1.0)
+        none, first, other, last = plan_each(choices, 3600.0, BEAM, price=1.0)
+        assert none == last == Routes(0.0, 0.0, {"alpha": ()}, {})
+        assert first.counts_m2 == pytest.approx(700 + (3600 - 152.5) * second_m2)
+        assert other.counts_m2 == pytest.approx(1400 + (3600 - 402.5) * second_m2)
+
     def test_a_free_helper_is_sent_to_the_best_and_if_there_is_nothing_else_to_what_is_not_worth_its_time(self) -> None:
         asked = replace(situation([self.POOR, FAR], [helper()]), price=1.0)
         assert PLAN.assign(replace(asked, price=0.0)) == {"alpha": 2}
@@ -388,10 +346,10 @@ class TestTimeToSpare:
 
     def test_what_may_still_come_is_told_beyond_what_time_is_worth(self) -> None:
         team = Team([NEAR, self.POOR], [helper(), helper("beta")], 3600.0)
-        teams = Teams([team], price=0.5)
-        second_m2 = teams.time_m2ps[0]
-        assert teams.alone[0, 1] == pytest.approx(np.maximum(team.alone_m2 - team.alone_s * second_m2, 0.0))
-        assert teams.later_m2ps == pytest.approx([max(0.0, team.later_m2ps - second_m2)])
+        second_m2 = team.time_m2ps(0.5)[0]
+        found = team.found(team.time_m2ps(0.5))
+        assert found.alone_m2 == pytest.approx(np.maximum(team.alone_m2 - team.alone_s * second_m2, 0.0))
+        assert found.later_m2ps == pytest.approx(max(0.0, team.later_m2ps - second_m2))
 
 
 class TestTurningRound:

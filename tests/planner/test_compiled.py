@@ -1,0 +1,136 @@
+"""What is compiled is kept on disk, and so may hang on nothing but its own file."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import os
+import subprocess
+import sys
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+from planner.compiled import Compiled, compile_all, compiled
+from planner.types import FloatArray
+
+ROOT = Path(__file__).parents[2]
+ROOMS = ("comms", "coordinator", "modem", "planner", "secondlook", "sim_world", "vehicle_agent", "viz")
+FILES = sorted(
+    path.relative_to(ROOT).as_posix()
+    for room in ROOMS
+    for path in (ROOT / room).rglob("*.py")
+    if "\n@compiled\n" in path.read_text(encoding="utf-8")
+)
+needs_compiling = pytest.mark.skipif("NUMBA_DISABLE_JIT" in os.environ, reason="nothing is compiled")
+
+
+@compiled
+def twice(number: float) -> float:
+    return 2.0 * number
+
+
+@compiled
+def four_times(numbers: FloatArray) -> FloatArray:
+    found = np.empty(numbers.size)
+    for place in range(numbers.size):
+        found[place] = twice(twice(numbers[place]))
+    return found
+
+
+def test_it_does_what_it_says_compiled_or_not() -> None:
+    assert twice(1.5) == 3.0
+    assert four_times(np.array([1.5, 2.0])).tolist() == [6.0, 8.0]
+    assert four_times._function(np.array([1.5])).tolist() == [6.0]
+
+
+@needs_compiling
+def test_it_is_compiled_once_for_each_sort_of_arguments_and_kept_on_disk() -> None:
+    four_times(np.ones(3))
+    assert four_times.compiled_for == 1
+    assert [*Path(four_times._made.stats.cache_path).glob("test_compiled.four_times-*.nbi")]
+    four_times(np.ones(6)[::2])
+    assert four_times.compiled_for == 2
+
+
+@needs_compiling
+def test_where_nothing_can_be_kept_it_is_compiled_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    import numba
+
+    njit = numba.njit
+
+    def without(*functions: Any, cache: bool = False) -> Any:
+        if cache:
+            raise RuntimeError("cannot cache function: no locator available")
+        return njit(*functions)
+
+    monkeypatch.setattr(numba, "njit", without)
+    assert Compiled(twice._function)._make()(1.5) == 3.0
+
+
+def test_something_is_compiled() -> None:
+    assert FILES
+
+
+@pytest.mark.parametrize("file", FILES)
+def test_compiled_functions_use_numpy_and_what_their_own_file_has(file: str) -> None:
+    """Else what is kept would go on with what another file had once: a function of that, or a number."""
+    module = importlib.import_module(file.removesuffix(".py").replace("/", "."))
+    tree = ast.parse((ROOT / file).read_text(encoding="utf-8"))
+    imported = {
+        name.asname or name.name
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Import | ast.ImportFrom)
+        for name in node.names
+    }
+    for node in tree.body:
+        if isinstance(node, ast.FunctionDef) and "compiled" in map(ast.unparse, node.decorator_list):
+            function = getattr(module, node.name)
+            plain = getattr(function, "py_func", getattr(function, "_function", function))
+            used = imported.intersection(plain.__code__.co_names)
+            assert {name for name in used if not is_library(getattr(module, name))} == set(), node.name
+
+
+def is_library(one: object) -> bool:
+    return isinstance(one, ModuleType) and one.__name__ in ("numpy", "math")
+
+
+def in_a_new_process(program: str) -> str:
+    run = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True)
+    return run.stdout.strip()
+
+
+@needs_compiling
+def test_as_nodes_are_made_all_is_compiled_that_the_coordinator_calls_and_for_nothing_else() -> None:
+    told = in_a_new_process(
+        "import sys\n"
+        "from secondlook.fleet.nodes import compile_nodes\n"
+        "from planner import compiled\n"
+        "compile_nodes()\n"
+        "from secondlook.launch.mission import run_in_passing\n"
+        "from secondlook.scenario import load_scenario\n"
+        "run_in_passing(load_scenario('tests/support/brief.yaml'))\n"
+        "for name, module in sorted(sys.modules.items()):\n"
+        "    for one in vars(module).values():\n"
+        "        if hasattr(one, 'py_func') and one.signatures:\n"
+        "            print(name, one.py_func.__name__, len(one.signatures))\n"
+    )
+    assert "coordinator.allocate.beam _search 1" in told.split("\n")
+    assert all(line.endswith(" 1") for line in told.split("\n"))
+
+
+def test_who_calls_nothing_compiled_does_not_import_numba() -> None:
+    told = in_a_new_process("import sys, secondlook.cli, coordinator.coordinator\nprint('numba' in sys.modules)")
+    assert told == "False"
+
+
+def test_what_is_compiled_already_is_not_asked_for_again() -> None:
+    calls = list[int]()
+    one = Compiled(twice._function)
+    one.called_with(lambda: (calls.append(1) or 1.0,))  # type: ignore[func-returns-value]
+    compile_all()
+    compile_all()
+    assert calls == [1]
