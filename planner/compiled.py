@@ -8,9 +8,8 @@ environment, so that a debugger sees into it.
 
 from __future__ import annotations
 
-import functools
-import sys
 from collections.abc import Callable
+from functools import cached_property, update_wrapper
 from typing import Any, Generic, ParamSpec, TypeVar
 
 P = ParamSpec("P")
@@ -26,34 +25,33 @@ class Compiled(Generic[P, R]):
     """
 
     def __init__(self, function: Callable[P, R]) -> None:
-        functools.update_wrapper(self, function)
+        update_wrapper(self, function)
         self._function = function
-        self._made: Any = None
 
     def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
         """Calls it."""
-        if self._made is None:
-            _make_all(sys.modules[self._function.__module__].__dict__)
-        made: R = self._made(*args, **kwargs)
+        made: R = self.made(*args, **kwargs)
         return made
+
+    @cached_property
+    def made(self) -> Any:
+        """What numba makes of it; the function itself where nothing is to be compiled."""
+        import numba  # noqa: PLC0415, see the class
+
+        numba.extending.typeof_impl.register(Compiled)(_type_of)
+        try:
+            return numba.njit(cache=True)(self._function)
+        except RuntimeError:  # nowhere to keep it
+            return numba.njit(self._function)
 
     @property
     def compiled_for(self) -> int:
         """For how many sorts of arguments it has been compiled so far; of each it takes seconds."""
-        return len(getattr(self._made, "signatures", ()))
+        return len(getattr(self.made, "signatures", ()))
 
     def called_with(self, sample: Callable[[], tuple[Any, ...]]) -> None:
         """Tells what it is called with from without: arguments of just these types. See `compile_all`."""
         _called.append((self, sample))
-
-    def _make(self) -> Any:
-        import numba  # noqa: PLC0415, see the class
-
-        try:
-            self._made = numba.njit(cache=True)(self._function)
-        except RuntimeError:  # nowhere to keep it
-            self._made = numba.njit(self._function)
-        return self._made
 
 
 def compiled(function: Callable[P, R]) -> Compiled[P, R]:
@@ -72,9 +70,8 @@ def compile_all() -> None:
         one(*sample())
 
 
-def _make_all(names: dict[str, Any]) -> None:
-    """Puts in a file's names those that numba makes in the place of its compiled functions, by which they find each
-    other."""
-    for name, one in list(names.items()):
-        if isinstance(one, Compiled):
-            names[name] = one._make()
+def _type_of(one: Compiled[..., Any], _: Any) -> Any:
+    """Has a compiled function find another under its name."""
+    from numba import typeof  # noqa: PLC0415, see the class
+
+    return typeof(one.made)  # type: ignore[no-untyped-call]

@@ -51,7 +51,7 @@ def test_it_does_what_it_says_compiled_or_not() -> None:
 def test_it_is_compiled_once_for_each_sort_of_arguments_and_kept_on_disk() -> None:
     four_times(np.ones(3))
     assert four_times.compiled_for == 1
-    assert [*Path(four_times._made.stats.cache_path).glob("test_compiled.four_times-*.nbi")]
+    assert [*Path(four_times.made.stats.cache_path).glob("test_compiled.four_times-*.nbi")]
     four_times(np.ones(6)[::2])
     assert four_times.compiled_for == 2
 
@@ -68,7 +68,7 @@ def test_where_nothing_can_be_kept_it_is_compiled_all_the_same(monkeypatch: pyte
         return njit(*functions)
 
     monkeypatch.setattr(numba, "njit", without)
-    assert Compiled(twice._function)._make()(1.5) == 3.0
+    assert Compiled(twice._function).made(1.5) == 3.0
 
 
 def test_something_is_compiled() -> None:
@@ -114,9 +114,9 @@ def test_as_nodes_are_made_all_is_compiled_that_the_coordinator_calls_and_for_no
         "from secondlook.scenario import load_scenario\n"
         "run_in_passing(load_scenario('tests/support/brief.yaml'))\n"
         "for name, module in sorted(sys.modules.items()):\n"
-        "    for one in vars(module).values():\n"
-        "        if hasattr(one, 'py_func') and one.signatures:\n"
-        "            print(name, one.py_func.__name__, len(one.signatures))\n"
+        "    for function, one in vars(module).items():\n"
+        "        if isinstance(one, compiled.Compiled) and one.compiled_for:\n"
+        "            print(name, function, one.compiled_for)\n"
     )
     assert "coordinator.allocate.beam _search 1" in told.split("\n")
     assert all(line.endswith(" 1") for line in told.split("\n"))
@@ -129,8 +129,12 @@ def test_who_calls_nothing_compiled_does_not_import_numba() -> None:
 
 def test_what_is_compiled_already_is_not_asked_for_again() -> None:
     calls = list[int]()
-    one = Compiled(twice._function)
-    one.called_with(lambda: (calls.append(1) or 1.0,))  # type: ignore[func-returns-value]
+
+    def sample() -> tuple[float]:
+        calls.append(1)
+        return (1.0,)
+
+    Compiled(twice._function).called_with(sample)
     compile_all()
     compile_all()
     assert calls == [1]

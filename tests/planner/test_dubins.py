@@ -10,7 +10,7 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
-from planner.dubins import TIE_M, DubinsPath, Pose, _turns, compass_rad, path_lengths_m, shortest_path
+from planner.dubins import TIE_M, DubinsPath, Pose, _wrapped, compass_rad, path_lengths_m, shortest_path
 
 NORTH, EAST, SOUTH, WEST = 0.0, math.pi / 2, math.pi, 3 * math.pi / 2
 
@@ -292,4 +292,4 @@ def test_who_turns_round_on_its_line_does_so_to_port_however_that_is_rounded(
 
 def test_an_angle_just_short_of_many_full_turns_is_none_and_not_less() -> None:
     # Its 39 turns are rounded up: 3e-14 is lacking.
-    assert _turns(np.array([-245.04422698000388])) == 0.0
+    assert _wrapped(-245.04422698000388) == 0.0

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from coordinator.cut.ground import CELLS_AT_ONCE, OBJECTIVES, Ground
+from coordinator.cut.ground import OBJECTIVES, Ground
 from coordinator.cut.window import Window
 from planner.types import FloatArray
 
@@ -52,13 +52,8 @@ class TestWorth:
 
     def test_it_may_be_asked_of_some_cells(self) -> None:
         one = ground(np.arange(12.0).reshape(3, 4) / 12, objective="both", threshold=0.4)
-        cells = Window(1, 3, 1, 2).cells
-        assert one.worth_of(cells) == pytest.approx(one.worth()[cells])
-
-    def test_of_a_map_wider_than_what_is_worked_on_at_once_it_is_told_row_by_row(self) -> None:
-        risk = np.zeros((2, CELLS_AT_ONCE + 1))
-        risk[0, 1], risk[1, -1] = 0.4, 0.8
-        assert ground(risk).worth() == pytest.approx(25 * 0.5 * risk)
+        window = Window(1, 3, 1, 2)
+        assert (one.worth(window) == one.worth()[window.cells]).all()
 
 
 class TestLeft:

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from coordinator.cut.ground import OBJECTIVES, Ground
-from coordinator.cut.search import Costs, Counts, Left, _edges, _side_by_side, look_anew, worth_of
+from coordinator.cut.search import Costs, Counts, Left, _edges, _side_by_side, look_anew
 from coordinator.cut.search import cut as cut_windows
 from coordinator.cut.strips import Cutting, CuttingRules
 from coordinator.cut.window import Window
@@ -468,7 +468,7 @@ class TestSideBySide:
     def test_they_are_put_behind_those_that_were_found_before(self) -> None:
         bands = Bands(np.ones((2, 2)), 2)
         found = np.full((4, 4), -9)
-        assert _side_by_side(bands.left, bands.terms(1.0, 0.5), found, 2) == 3
+        assert _side_by_side(bands.left, bands.costs(1.0, 0.5), found, 2) == 3
         assert found.tolist() == [[-9] * 4, [-9] * 4, [0, 2, 0, 2], [-9] * 4]
 
     def test_what_brings_more_than_it_costs_by_rounding_alone_is_left_out(self) -> None:
@@ -520,6 +520,5 @@ def test_for_ground_of_all_kinds_the_cutting_is_compiled_once() -> None:
             for its_rules in rules:
                 for across in (False, True):
                     Cutting(GRID, told, its_rules, across=across).copy().cut(PRICE)
-    ground(hot(np.s_[10:40, 15:19]), contacts=contacts).worth(Window(0, 3, 0, 4))
-    for one in (cut_windows, look_anew, worth_of):
+    for one in (cut_windows, look_anew):
         assert one.compiled_for == 1
