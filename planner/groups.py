@@ -65,6 +65,9 @@ def _labels(cells: BoolArray, columns: int, block: int) -> tuple[NDArray[np.int3
     return labels, count
 
 
+_labels.called_with(lambda: (np.ones(1, dtype=np.bool_), 1, 1))
+
+
 @compiled
 def _join(leader: IntArray, one: int, other: int) -> None:
     """Makes one group of those of two cells, led by the first cell of both."""

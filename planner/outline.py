@@ -93,6 +93,10 @@ def _without_notches(corners: IntArray, most_vertices: int) -> BoolArray:
     return is_left
 
 
+_boundary.called_with(lambda: (np.array([False, False, True, False, False]), 1))
+_without_notches.called_with(lambda: (np.zeros((0, 2), dtype=np.int64), 4))
+
+
 @compiled
 def _smallest(areas: IntArray, corners: IntArray) -> int:
     """The place of the smallest area, of equals that of the corner farthest left and then lowest."""

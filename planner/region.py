@@ -55,6 +55,9 @@ def _points_inside(x: FloatArray, y: FloatArray, columns: FloatArray, rows: Floa
     return inside
 
 
+_points_inside.called_with(lambda: tuple(np.zeros((4, 1))))
+
+
 ON_BOUNDARY_M = 1e-6
 """A cell whose centre is as near to the boundary as this is inside."""
 NEAR_CELLS = 1.5

@@ -120,6 +120,9 @@ def _add(
             largest_levels[at_row, at_column] = _level(held[1, own_row, own_column])
 
 
+_add.called_with(lambda: (np.zeros((0, 0)), (0, 0), np.zeros((2, 0, 0)), (0, 0), *np.zeros((2, 0, 0), dtype=np.uint8)))
+
+
 @compiled
 def _levels(nats: FloatArray) -> LevelArray:
     """Those of nats in a row."""
@@ -127,6 +130,9 @@ def _levels(nats: FloatArray) -> LevelArray:
     for place in range(nats.size):
         levels[place] = _level(nats[place])
     return levels
+
+
+_levels.called_with(lambda: (np.zeros(1),))
 
 
 @compiled

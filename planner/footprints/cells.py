@@ -74,6 +74,9 @@ def _seen_by(look: _Look, across_m: FloatArray, along_m: FloatArray, p_detect: F
     return found
 
 
+_seen_by.called_with(lambda: (_Look(*np.ones(8).tolist()), np.ones(1), np.ones(1), np.ones((2, 1, 1))))
+
+
 def over_cells(grid: GridSpec, geometry: LookGeometry, p_detect: FloatArray) -> FloatArray:
     """Of each range bin the mean P_d of those that a cell about its middle is wide, as far as they were seen; 0 where
     the bin itself was not. `p_detect`: shape (2, along_bins, range_bins)."""
