@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.types import BoolArray
-
-IndexArray = NDArray[np.intp]
+from planner.compiled import compiled
+from planner.types import BoolArray, IntArray
 
 
 def neighbours(cells: BoolArray) -> BoolArray:
@@ -23,9 +22,6 @@ def neighbours(cells: BoolArray) -> BoolArray:
 def label_groups(cells: BoolArray, block: int) -> tuple[NDArray[np.int32], int]:
     """Numbers the groups of cells that touch by their sides.
 
-    Works on runs, cells of a row that follow each other within a block. The labelling of a general image library costs
-    more to import than all of a mission's calls together.
-
     Args:
         cells: shape (rows, columns).
         block: groups end at the borders of blocks of so many rows and columns, counted from the array's corner; >= 1.
@@ -39,45 +35,50 @@ def label_groups(cells: BoolArray, block: int) -> tuple[NDArray[np.int32], int]:
     """
     if block < 1:
         raise ValueError(f"a block has at least one row and column, not {block}")
-    # A run is told by the places of its first and last cell in the flattened array.
-    goes_on = cells[:, :-1] & cells[:, 1:]
-    goes_on[:, block - 1 :: block] = False
-    begins, ends = cells.copy(), cells.copy()
-    begins[:, 1:] ^= goes_on
-    ends[:, :-1] ^= goes_on
-    first, last = begins.ravel().nonzero()[0], ends.ravel().nonzero()[0]
-
-    leader = _connected(first.size, *_neighbours(first, last, cells.shape[1], block))
-    number = np.cumsum(leader == np.arange(leader.size), dtype=np.int32)
-    labels = np.zeros(cells.shape, dtype=np.int32)
-    labels[cells] = np.repeat(number[leader], last - first + 1)
-    return labels, int(number[-1]) if number.size else 0
+    labels, count = _labels(np.array(cells).ravel(), cells.shape[1], block)
+    return labels.reshape(cells.shape), count
 
 
-def _neighbours(first: IndexArray, last: IndexArray, columns: int, block: int) -> tuple[IndexArray, IndexArray]:
-    """The pairs of runs, one below the other in one block, that have a column in common.
+@compiled
+def _labels(cells: BoolArray, columns: int, block: int) -> tuple[NDArray[np.int32], int]:
+    """The same of cells row after row."""
+    leader = np.empty(cells.size, np.int64)  # of each cell the first of its group, or one before it in that
+    for row in range(cells.size // max(columns, 1)):
+        begins_block = row % block == 0
+        for first_column in range(0, columns, block):
+            first = row * columns + first_column
+            for place in range(first, row * columns + min(first_column + block, columns)):
+                if cells[place]:
+                    goes_on = place > first and cells[place - 1]
+                    leader[place] = leader[place - 1] if goes_on else place
+                    # With two above that touch, too, it is joined as the one before it is.
+                    if not begins_block and cells[place - columns] and not (goes_on and cells[place - columns - 1]):
+                        _join(leader, place - columns, place)
+    labels, count = np.zeros(cells.size, np.int32), 0
+    for place in range(cells.size):
+        if cells[place]:
+            first = _first(leader, place)
+            if first == place:
+                count += 1
+                labels[place] = count
+            labels[place] = labels[first]
+    return labels, count
 
-    Args:
-        first: the place of each run's first cell, ascending.
-        last: that of its last.
-        columns: of the array.
-        block: rows of a block.
-    """
-    lowest = last.searchsorted(first - columns)
-    counts = first.searchsorted(last - columns, side="right") - lowest
-    counts[first // columns % block == 0] = 0
-    above = np.repeat(np.arange(first.size), counts)
-    below = np.arange(above.size) + np.repeat(lowest + counts - np.cumsum(counts), counts)
-    return above, below
+
+_labels.called_with(lambda: (np.ones(1, dtype=np.bool_), 1, 1))
 
 
-def _connected(count: int, one: IndexArray, other: IndexArray) -> IndexArray:
-    """For each of so many runs the first run that the pairs, one run and the other, connect it with."""
-    leader = np.arange(count)
-    while True:
-        leads_one, leads_other = leader[one], leader[other]
-        if (leads_one == leads_other).all():
-            return leader
-        # Of two leaders the later follows the earlier; then everyone follows the leader's leader.
-        np.minimum.at(leader, np.maximum(leads_one, leads_other), np.minimum(leads_one, leads_other))
-        leader = leader[leader]
+@compiled
+def _join(leader: IntArray, one: int, other: int) -> None:
+    """Makes one group of those of two cells, led by the first cell of both."""
+    one, other = _first(leader, one), _first(leader, other)
+    leader[max(one, other)] = min(one, other)
+
+
+@compiled
+def _first(leader: IntArray, place: int) -> int:
+    """The first cell of a cell's group."""
+    while leader[place] != place:
+        leader[place] = leader[leader[place]]
+        place = leader[place]
+    return place

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import heapq
-from itertools import product
-
 import numpy as np
 import shapely
 
-from planner.types import BoolArray, FloatArray
+from planner.compiled import compiled
+from planner.types import BoolArray, FloatArray, IntArray
 
-Corner = tuple[int, int]
-
-FILLED = -1
-"""As the area of a notch: that of none, once its vertex is left out."""
+NO_NOTCH = np.iinfo(np.int64).max
+"""As the area of a notch: that of none."""
 
 
 def outline(cells: BoolArray, most_vertices: int) -> FloatArray:
@@ -30,90 +26,114 @@ def outline(cells: BoolArray, most_vertices: int) -> FloatArray:
     Returns:
         Vertices (column, row) in units of cells, counterclockwise, the first not repeated; shape (n, 2).
     """
-    corners = _without_notches(_boundary(cells), most_vertices)
-    if len(corners) > most_vertices:
-        return _sides_about(np.array(corners, dtype=np.float64), most_vertices)
-    return np.array(corners, dtype=np.float64)
+    wide = cells.shape[1] + 2
+    padded = np.zeros((cells.shape[0] + 2, wide), dtype=np.bool_)
+    padded[1:-1, 1:-1] = cells
+    corners = _boundary(padded.ravel(), wide)
+    vertices = corners[_without_notches(corners, most_vertices)].astype(np.float64)
+    return vertices if len(vertices) <= most_vertices else _sides_about(vertices, most_vertices)
 
 
-def _boundary(cells: BoolArray) -> list[Corner]:
-    """The corners of a patch's outer boundary, counterclockwise.
+@compiled
+def _boundary(patch: BoolArray, wide: int) -> IntArray:
+    """The corners (column, row) of a patch's outer boundary, counterclockwise; shape (n, 2). `patch`: row after row of
+    so many cells, of which those along the edges are empty.
 
     Follows the sides of cells with the patch on the left, from the first cell of the lowest row. Where the patch
     touches itself at a corner only, it turns right: what the patch encloses there is a hole, and left out.
     """
-    rows, columns = cells.shape
-    wide = columns + 2
-    padded = np.zeros((rows + 2, wide), dtype=np.bool_)
-    padded[1:-1, 1:-1] = cells
-    patch = padded.tobytes()  # cell (i, j) is at j * wide + i, and so is the lattice point (i, j)
     ways = (1, wide, -1, -wide)  # right, up, left, down
     ahead = (-wide, 0, -1, -wide - 1)  # the cell to the right of a point and ahead; the next one is to the left
-    start = place = patch.index(1)
-    way = 0
-    turns: list[int] = []
-    while True:
+    corners, count = np.empty((2 * patch.size, 2), np.int64), 0  # no point is passed more often than twice
+    start = 0  # cell (i, j) is at j * wide + i, and so is the lattice point (i, j)
+    while not patch[start]:
+        start += 1
+    place, way = start, 0
+    while count == 0 or place != start:
         place += ways[way]
-        if patch[place + ahead[way]]:
-            turns.append(place)
-            way = (way - 1) % 4
-        elif not patch[place + ahead[(way + 1) % 4]]:
-            turns.append(place)
-            way = (way + 1) % 4
-        if place == start:
-            return [(place % wide - 1, place // wide - 1) for place in turns]
+        left = (way + 1) % 4
+        turns_right = patch[place + ahead[way]]
+        if turns_right or not patch[place + ahead[left]]:
+            corners[count, 0], corners[count, 1] = place % wide - 1, place // wide - 1
+            way, count = (way + 3) % 4 if turns_right else left, count + 1
+    return corners[:count]
 
 
-def _without_notches(corners: list[Corner], most_vertices: int) -> list[Corner]:
-    """Fills a polygon's notches, smallest first, until it has few enough vertices or no notch that can be filled.
+@compiled
+def _without_notches(corners: IntArray, most_vertices: int) -> BoolArray:
+    """Fills a polygon's notches, smallest first, of equals the one farthest left and then lowest, until it has few
+    enough vertices or no notch that can be filled; returns which vertices are left, shape (n,).
 
     A notch is a vertex at which the polygon does not bend outward; it is filled by leaving that vertex out, where the
     triangle with its neighbours, which the polygon gains, holds no other vertex. Corners counterclockwise; no corner
     twice.
     """
-    count = len(corners)
-    if count <= most_vertices:
-        return corners
+    count = left = len(corners)
     # The ring by places in the list: of each corner the one before and the one after it that are left.
-    before, after = [count - 1, *range(count - 1)], [*range(1, count), 0]
-    areas = [-turn for turn in map(_turn, corners[-1:] + corners[:-1], corners, corners[1:] + corners[:1])]
-    queue = [(areas[k], corner, k) for k, corner in enumerate(corners) if areas[k] >= 0]
-    heapq.heapify(queue)
-    left = set(corners)
-    while queue and len(left) > most_vertices:
-        area, corner, k = heapq.heappop(queue)
-        if areas[k] != area:
-            continue  # filled already, or changed when its neighbour was
-        one, other = before[k], after[k]
+    before, after, areas = np.empty(count, np.int64), np.empty(count, np.int64), np.empty(count, np.int64)
+    for place in range(count):
+        before[place], after[place] = (place - 1) % count, (place + 1) % count
+        areas[place] = _area(corners, before[place], place, after[place])
+    is_left = np.ones(count, np.bool_)
+    while left > most_vertices:
+        notch = _smallest(areas, corners)
+        area = areas[notch]
+        if area == NO_NOTCH:
+            break
+        areas[notch] = NO_NOTCH
         # A triangle of half a cell holds no other lattice point, and a flat one has no inside.
-        if area > 1 and _any_in_triangle(corners[one], corner, corners[other], left):
-            continue  # what blocks it is part of the polygon, until a neighbour is left out, which queues it anew
+        if area > 1 and _holds_any(corners, before, notch, after):
+            continue  # what blocks it is part of the polygon, until a neighbour is left out
+        one, other = before[notch], after[notch]
         after[one], before[other] = other, one
-        left.remove(corner)
-        areas[k] = FILLED
+        is_left[notch] = False
+        left -= 1
         for beside in (one, other):
-            area = -_turn(corners[before[beside]], corners[beside], corners[after[beside]])
-            areas[beside] = area
-            if area >= 0:
-                heapq.heappush(queue, (area, corners[beside], beside))
-    return [corner for corner in corners if corner in left]
+            areas[beside] = _area(corners, before[beside], beside, after[beside])
+    return is_left
 
 
-def _turn(a: Corner, b: Corner, c: Corner) -> int:
+_boundary.called_with(lambda: (np.array([False, False, True, False, False]), 1))
+_without_notches.called_with(lambda: (np.zeros((0, 2), dtype=np.int64), 4))
+
+
+@compiled
+def _smallest(areas: IntArray, corners: IntArray) -> int:
+    """The place of the smallest area, of equals that of the corner farthest left and then lowest."""
+    best = 0
+    for place in range(1, len(areas)):
+        if areas[place] <= areas[best]:
+            ahead = corners[place, 0] - corners[best, 0]
+            if areas[place] < areas[best] or ahead < 0 or (ahead == 0 and corners[place, 1] < corners[best, 1]):
+                best = place
+    return best
+
+
+@compiled
+def _area(corners: IntArray, before: int, place: int, after: int) -> int:
+    """Twice the area of the notch at a corner, NO_NOTCH where the polygon bends outward."""
+    turn = _turn(corners, before, place, after)
+    return -turn if turn <= 0 else NO_NOTCH
+
+
+@compiled
+def _turn(corners: IntArray, a: int, b: int, c: int) -> int:
     """Twice the area of the triangle a, b, c: above 0 where the way from a over b to c bends left."""
-    return (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
+    ahead_x, ahead_y = corners[b, 0] - corners[a, 0], corners[b, 1] - corners[a, 1]
+    turn: int = ahead_x * (corners[c, 1] - corners[b, 1]) - ahead_y * (corners[c, 0] - corners[b, 0])
+    return turn
 
 
-def _any_in_triangle(a: Corner, b: Corner, c: Corner, vertices: set[Corner]) -> bool:
-    """Whether any vertex but its own lies in or on a triangle that bends right."""
-    x0, x1 = min(a[0], b[0], c[0]), max(a[0], b[0], c[0])
-    y0, y1 = min(a[1], b[1], c[1]), max(a[1], b[1], c[1])
-    if (x1 - x0 + 1) * (y1 - y0 + 1) < len(vertices):
-        near = [p for p in product(range(x0, x1 + 1), range(y0, y1 + 1)) if p in vertices and p not in (a, b, c)]
-    else:
-        near = [p for p in vertices if x0 <= p[0] <= x1 and y0 <= p[1] <= y1 and p not in (a, b, c)]
-    # Most often there is none.
-    return bool(near) and any(_turn(a, b, p) <= 0 and _turn(b, c, p) <= 0 and _turn(c, a, p) <= 0 for p in near)
+@compiled
+def _holds_any(corners: IntArray, before: IntArray, notch: int, after: IntArray) -> bool:
+    """Whether any vertex that is left but its own lies in or on the triangle of a notch, which bends right."""
+    a, b, c = before[notch], notch, after[notch]
+    place = after[c]
+    while place != a:
+        if _turn(corners, a, b, place) <= 0 and _turn(corners, b, c, place) <= 0 and _turn(corners, c, a, place) <= 0:
+            return True
+        place = after[place]
+    return False
 
 
 def _sides_about(corners: FloatArray, sides: int) -> FloatArray:

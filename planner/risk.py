@@ -13,6 +13,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from planner.compiled import compiled
 from planner.types import EVERYWHERE, BoolArray, FloatArray, GridSpec, Window
 
 NATS_PER_LEVEL = 0.02
@@ -42,18 +43,19 @@ class RiskLayer:
     def add_look(self, rows: slice, columns: slice, p_detect: FloatArray) -> None:
         """Adds a look's P_d per cell of a window, 0 where a cell was not seen.
 
-        Raises ValueError for P_d outside [0, 0.999].
+        Raises ValueError for P_d outside [0, 0.999], or not as many as the window has cells.
         """
+        rows, columns = self._bounds((rows, columns))
+        if p_detect.shape != (rows.stop - rows.start, columns.stop - columns.start):
+            raise ValueError(f"a look of {p_detect.shape} cells in another window")
         if not p_detect.size:
             return
         if not (float(p_detect.min()) >= 0.0 and float(p_detect.max()) <= HIGHEST_P_DETECT):
             raise ValueError(f"P_d outside 0 to {HIGHEST_P_DETECT}")
-        nats = -np.log1p(-p_detect)
-        sums, largest = self._held(*self._bounds((rows, columns)))
-        sums += nats
-        np.maximum(largest, nats, out=largest)
-        self.sum_levels[rows, columns] = to_levels(sums)
-        self.largest_levels[rows, columns] = to_levels(largest)
+        self._hold(rows, columns)
+        begin, held_from = ((window[0].start, window[1].start) for window in ((rows, columns), self._part))
+        nats = np.ascontiguousarray(-np.log1p(-p_detect))
+        _add(nats, begin, self._nats, held_from, self.sum_levels, self.largest_levels)
 
     def nats(self, window: Window = EVERYWHERE) -> FloatArray:
         """-ln(1 - P_d) of a window's cells, summed over looks, and of the largest single ones, shape (2, rows,
@@ -73,8 +75,8 @@ class RiskLayer:
         rows, columns = (slice(*one.indices(size)[:2]) for one, size in zip(window, self.sum_levels.shape, strict=True))
         return rows, columns
 
-    def _held(self, rows: slice, columns: slice) -> FloatArray:
-        """What is held of a window, to be changed there; of more than before where it reaches farther."""
+    def _hold(self, rows: slice, columns: slice) -> None:
+        """Holds the nats of a window, too."""
         part = [
             (min(held.start, here.start), max(held.stop, here.stop)) if held.stop else (here.start, here.stop)
             for held, here in zip(self._part, (rows, columns), strict=True)
@@ -85,8 +87,6 @@ class RiskLayer:
                 for (first, end), size in zip(part, self.sum_levels.shape, strict=True)
             ]
             self._nats, self._part = self.nats((larger[0], larger[1])), (larger[0], larger[1])
-        held: FloatArray = self._nats[:, *_from((rows, columns), self._part)]
-        return held
 
 
 def _from(window: Sequence[slice], part: Window) -> list[slice]:
@@ -96,8 +96,49 @@ def _from(window: Sequence[slice], part: Window) -> list[slice]:
 
 def to_levels(nats: FloatArray) -> LevelArray:
     """Nats as whole levels. What was seen at all is at least one level, so that it does not read as unseen."""
-    levels = np.minimum(np.rint(nats * (1 / NATS_PER_LEVEL)), MOST_LEVELS)
-    return np.maximum(levels, nats > 0).astype(np.uint8)
+    return _levels(np.array(nats).ravel()).reshape(nats.shape)
+
+
+@compiled
+def _add(
+    nats: FloatArray,
+    begin: tuple[int, int],
+    held: FloatArray,
+    held_from: tuple[int, int],
+    sum_levels: LevelArray,
+    largest_levels: LevelArray,
+) -> None:
+    """Adds a look's nats, from the cell of the grid on where they begin, to those that are held from another one on,
+    and finds the levels, of the whole grid, anew."""
+    for row in range(nats.shape[0]):
+        for column in range(nats.shape[1]):
+            one, at_row, at_column = nats[row, column], begin[0] + row, begin[1] + column
+            own_row, own_column = at_row - held_from[0], at_column - held_from[1]
+            held[0, own_row, own_column] += one
+            held[1, own_row, own_column] = max(held[1, own_row, own_column], one)
+            sum_levels[at_row, at_column] = _level(held[0, own_row, own_column])
+            largest_levels[at_row, at_column] = _level(held[1, own_row, own_column])
+
+
+_add.called_with(lambda: (np.zeros((0, 0)), (0, 0), np.zeros((2, 0, 0)), (0, 0), *np.zeros((2, 0, 0), dtype=np.uint8)))
+
+
+@compiled
+def _levels(nats: FloatArray) -> LevelArray:
+    """Those of nats in a row."""
+    levels = np.empty(nats.size, np.uint8)
+    for place in range(nats.size):
+        levels[place] = _level(nats[place])
+    return levels
+
+
+_levels.called_with(lambda: (np.zeros(1),))
+
+
+@compiled
+def _level(nats: float) -> int:
+    """Nats as whole levels, at least one where there are any."""
+    return max(int(min(np.rint(nats * (1 / NATS_PER_LEVEL)), MOST_LEVELS)), int(nats > 0))
 
 
 def residual_risk(sum_levels: NDArray[np.integer], largest_levels: NDArray[np.integer], rho: float = 0.0) -> FloatArray:

@@ -6,9 +6,11 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
+from planner.compiled import compiled
 from planner.footprints.footprint import Reach
 from planner.risk import HIGHEST_P_DETECT
 from planner.types import EVERYWHERE, BoolArray, FloatArray, GridSpec, LookGeometry, SweepFrame, Track, Window
@@ -26,26 +28,53 @@ def look_on_grid(grid: GridSpec, geometry: LookGeometry, p_detect: FloatArray) -
     right under the track belongs to starboard. Of consecutive looks of one track exactly one sees a cell.
     """
     # Rounded, so that one look's end is the next one's begin to the last bit, however each was computed.
-    begin_m = round(geometry.first_along_m, 6)
-    end_m = round(geometry.first_along_m + geometry.along_bins * geometry.along_bin_m, 6)
-    reach_m = (geometry.range_bins - 0.5) * geometry.range_bin_m
+    first_m, along_bin_m, range_bin_m = map(float, (geometry.first_along_m, geometry.along_bin_m, geometry.range_bin_m))
+    begin_m, end_m = round(first_m, 6), round(first_m + geometry.along_bins * along_bin_m, 6)
+    reach_m = (geometry.range_bins - 0.5) * range_bin_m
     turn_rad = geometry.heading_rad - grid.frame.heading_rad
     sin, cos = math.sin(turn_rad), math.cos(turn_rad)
     origin_across, origin_along = grid.frame.to_sweep(*geometry.origin)
     corners = [(lateral_m, along_m) for lateral_m in (-reach_m, reach_m) for along_m in (begin_m, end_m)]
     columns = _window([origin_across + u_m * cos + v_m * sin for u_m, v_m in corners], grid.across_m)
     rows = _window([origin_along - u_m * sin + v_m * cos for u_m, v_m in corners], grid.along_m)
-    du = (grid.across_m[columns] - origin_across)[np.newaxis, :]
-    dv = (grid.along_m[rows] - origin_along)[:, np.newaxis]
-    lateral_m = du * cos - dv * sin
-    along_m = du * sin + dv * cos + EDGE_TOLERANCE_M
-    along_bin = np.floor((along_m - begin_m) / geometry.along_bin_m).astype(np.intp)
-    range_bin = np.floor((np.abs(lateral_m) + EDGE_TOLERANCE_M) / geometry.range_bin_m + 0.5).astype(np.intp)
-    side = (lateral_m >= -EDGE_TOLERANCE_M).astype(np.intp)
-    seen = (along_m >= begin_m) & (along_m < end_m) & (range_bin < geometry.range_bins)
-    along_bin = np.minimum(np.maximum(along_bin, 0), geometry.along_bins - 1)  # clip takes longer with whole numbers
-    range_bin = np.minimum(range_bin, geometry.range_bins - 1)
-    return rows, columns, np.where(seen, p_detect[side, along_bin, range_bin], 0.0)
+    look = _Look(origin_across, origin_along, sin, cos, begin_m, end_m, along_bin_m, range_bin_m)
+    own = np.array(p_detect, dtype=np.float64, order="C")  # one that may be written to, as not every message's may
+    return rows, columns, _seen_by(look, grid.across_m[columns], grid.along_m[rows], own)
+
+
+class _Look(NamedTuple):
+    """A look in the grid's sweep frame: where its track begins, sine and cosine of its heading there; from where to
+    where along the track it looks, and how large its bins are."""
+
+    across_m: float
+    along_m: float
+    sin: float
+    cos: float
+    begin_m: float
+    end_m: float
+    along_bin_m: float
+    range_bin_m: float
+
+
+@compiled
+def _seen_by(look: _Look, across_m: FloatArray, along_m: FloatArray, p_detect: FloatArray) -> FloatArray:
+    """The P_d that each cell gets, by the middles of columns and rows; shape (rows, columns)."""
+    _, along_bins, range_bins = p_detect.shape
+    found = np.zeros((along_m.size, across_m.size))
+    for row in range(along_m.size):
+        for column in range(across_m.size):
+            du, dv = across_m[column] - look.across_m, along_m[row] - look.along_m
+            lateral_m = du * look.cos - dv * look.sin
+            ahead_m = du * look.sin + dv * look.cos + EDGE_TOLERANCE_M
+            range_bin = math.floor((abs(lateral_m) + EDGE_TOLERANCE_M) / look.range_bin_m + 0.5)
+            if look.begin_m <= ahead_m < look.end_m and range_bin < range_bins:
+                along_bin = min(math.floor((ahead_m - look.begin_m) / look.along_bin_m), along_bins - 1)
+                side = 1 if lateral_m >= -EDGE_TOLERANCE_M else 0
+                found[row, column] = p_detect[side, along_bin, range_bin]
+    return found
+
+
+_seen_by.called_with(lambda: (_Look(*np.ones(8).tolist()), np.ones(1), np.ones(1), np.ones((2, 1, 1))))
 
 
 def over_cells(grid: GridSpec, geometry: LookGeometry, p_detect: FloatArray) -> FloatArray:

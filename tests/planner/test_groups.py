@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from compilations import kinds_compiled
 from hypothesis import example, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 from numpy.typing import NDArray
 
-from planner.groups import label_groups, neighbours
+from planner.groups import _labels, label_groups, neighbours
 from planner.types import BoolArray
 
 pictures = arrays(np.bool_, array_shapes(min_dims=2, max_dims=2, min_side=1, max_side=12))
@@ -93,6 +94,13 @@ class TestByHand:
     def test_refuses_blocks_without_cells(self, block: int) -> None:
         with pytest.raises(ValueError, match="block"):
             label_groups(np.ones((2, 2), dtype=bool), block)
+
+    def test_is_compiled_for_one_kind_of_cells(self) -> None:
+        read_only = cells_of("##. #.#")
+        read_only.setflags(write=False)
+        for cells in (read_only, read_only.T, read_only[:, ::2]):
+            label_groups(cells, 2)
+        assert kinds_compiled(_labels) == [1]
 
 
 class TestProperties:

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from compilations import kinds_compiled
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -14,6 +15,8 @@ from planner.risk import (
     NATS_PER_LEVEL,
     LevelArray,
     RiskLayer,
+    _add,
+    _levels,
     residual_risk,
     risk_of_levels,
     risk_statistics,
@@ -117,6 +120,21 @@ class TestRiskLayer:
             layer.add_look(*EVERYWHERE, look)
         assert not layer.nats()[0].any()
         assert not layer.sum_levels.any()
+
+    @pytest.mark.parametrize("shape", [(1, 4), (3, 1), (4, 3), (0, 4), (3, 5)])
+    def test_refuses_a_look_in_another_window(self, shape: tuple[int, int]) -> None:
+        layer = RiskLayer(GRID)
+        with pytest.raises(ValueError, match="window"):
+            layer.add_look(*EVERYWHERE, np.full(shape, 0.5))
+        assert not layer.sum_levels.any()
+
+    def test_is_compiled_for_one_kind_of_looks(self) -> None:
+        layer = layer_of(np.full((4, 3), 0.5).T, np.full((3, 8), 0.5)[:, ::2])
+        layer.add_look(slice(1, 2), slice(2, 3), np.full((1, 1), 0.5))
+        read_only = to_levels(layer.nats()).astype(np.float64)
+        read_only.setflags(write=False)
+        to_levels(read_only[0])
+        assert kinds_compiled(_add, _levels) == [1, 1]
 
 
 class TestToLevels:

@@ -7,10 +7,11 @@ import math
 
 import numpy as np
 import pytest
+from compilations import kinds_compiled
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from planner.footprints.cells import EDGE_TOLERANCE_M, look_on_grid, over_cells
+from planner.footprints.cells import EDGE_TOLERANCE_M, _seen_by, look_on_grid, over_cells
 from planner.risk import HIGHEST_P_DETECT
 from planner.types import FloatArray, GridSpec, LookGeometry, SweepFrame
 
@@ -158,6 +159,14 @@ class TestByHand:
         rows, columns, on_cells = look_on_grid(self.GRID, geometry, numbered(geometry))
         assert not on_cells.any()
         assert np.zeros(self.GRID.shape)[rows, columns].shape == on_cells.shape
+
+    def test_is_compiled_for_one_kind_of_looks(self) -> None:
+        read_only = np.full((2, 4, 10), 0.5)
+        read_only.setflags(write=False)
+        on_whole_grid(self.GRID, look_at((10, 5), NORTH, (5, 5), (4, 10)), read_only)
+        turned = np.full((10, 4, 2), 0.5).T
+        on_whole_grid(self.GRID, look_at((10.5, 5.5), 0.5, (2.5, 1.5), (4, 10)), turned)
+        assert kinds_compiled(_seen_by) == [1]
 
 
 class TestProperties:
