@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from planner.area import SurveyArea
-from planner.compiled import compiled
 from planner.rounding import rounded
 from planner.types import BoolArray, FloatArray, GridSpec, Point, Strip
 
@@ -20,7 +19,8 @@ from planner.types import BoolArray, FloatArray, GridSpec, Point, Strip
 def points_inside(x: FloatArray, y: FloatArray, columns: FloatArray, rows: FloatArray) -> BoolArray:
     """The points inside a simple polygon, those on its boundary left out; shape (rows, columns).
 
-    Along each row the points behind an odd number of crossings are inside.
+    Along each row the points behind an odd number of crossings are inside. A general library takes twice as long, as it
+    asks of each point by itself.
 
     Args:
         x: the polygon's corners, in either sense of rotation, the first not repeated.
@@ -28,30 +28,19 @@ def points_inside(x: FloatArray, y: FloatArray, columns: FloatArray, rows: Float
         columns: the lattice's x, ascending, at least one.
         rows: its y, ascending.
     """
-    return _points_inside(*(np.array(one, dtype=np.float64) for one in (x, y, columns, rows)))
-
-
-@compiled
-def _points_inside(x: FloatArray, y: FloatArray, columns: FloatArray, rows: FloatArray) -> BoolArray:
-    """See `points_inside`."""
-    inside = np.zeros((rows.size, columns.size), np.bool_)
-    on_boundary = np.zeros((rows.size, columns.size), np.bool_)
-    for side in range(x.size):
-        begin_x, begin_y, end_x, end_y = x[side - 1], y[side - 1], x[side], y[side]
-        for row in range(rows.size):
-            if (begin_y <= rows[row]) != (end_y <= rows[row]):
-                crossing = begin_x + (rows[row] - begin_y) * (end_x - begin_x) / (end_y - begin_y)
-                for column in range(columns.size):
-                    inside[row, column] ^= columns[column] >= crossing
-                    on_boundary[row, column] |= columns[column] == crossing
-            # A corner, and a side along a row, that no crossing tells of.
-            if begin_y == rows[row]:
-                along = end_x if end_y == begin_y else begin_x
-                for column in range(columns.size):
-                    on_boundary[row, column] |= min(begin_x, along) <= columns[column] <= max(begin_x, along)
-    for row in range(rows.size):
-        for column in range(columns.size):
-            inside[row, column] &= not on_boundary[row, column]
+    next_x, next_y = np.concatenate([x[1:], x[:1]]), np.concatenate([y[1:], y[:1]])
+    row, side = ((y <= rows[:, np.newaxis]) != (next_y <= rows[:, np.newaxis])).nonzero()
+    crossing = x[side] + (rows[row] - y[side]) * (next_x - x)[side] / (next_y - y)[side]
+    inside = np.zeros((rows.size, columns.size + 1), dtype=np.bool_)
+    np.logical_xor.at(inside, (row, np.searchsorted(columns, crossing)), True)
+    inside = np.logical_xor.accumulate(inside, axis=1)[:, :-1]
+    nearest = np.minimum(np.searchsorted(columns, crossing), columns.size - 1)
+    met = columns[nearest] == crossing
+    inside[row[met], nearest[met]] = False
+    # A corner, and a side along a row, that no crossing tells of.
+    for at, corner in np.argwhere(y == rows[:, np.newaxis]).tolist():
+        ends = sorted((x[corner], next_x[corner] if next_y[corner] == y[corner] else x[corner]))
+        inside[at, (columns >= ends[0]) & (columns <= ends[1])] = False
     return inside
 
 
