@@ -44,9 +44,6 @@ def points_inside(x: FloatArray, y: FloatArray, columns: FloatArray, rows: Float
     return inside
 
 
-_points_inside.called_with(lambda: tuple(np.zeros((4, 1))))
-
-
 ON_BOUNDARY_M = 1e-6
 """A cell whose centre is as near to the boundary as this is inside."""
 NEAR_CELLS = 1.5

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from compilations import kinds_compiled
 from hypothesis import example, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
@@ -100,7 +99,7 @@ class TestByHand:
         read_only.setflags(write=False)
         for cells in (read_only, read_only.T, read_only[:, ::2]):
             label_groups(cells, 2)
-        assert kinds_compiled(_labels) == [1]
+        assert _labels.compiled_for == 1
 
 
 class TestProperties:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapely
-from compilations import kinds_compiled
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
@@ -184,4 +183,4 @@ class TestProperties:
 def test_is_compiled_for_one_kind_of_arguments() -> None:
     for cells in (cells_of("#.. ##. ###").T, cells_of("#.#.#. ######")[:, ::2]):
         outline(cells, 5)
-    assert kinds_compiled(_boundary, _without_notches) == [1, 1]
+    assert [one.compiled_for for one in (_boundary, _without_notches)] == [1] * 2

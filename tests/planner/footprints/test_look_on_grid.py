@@ -7,7 +7,6 @@ import math
 
 import numpy as np
 import pytest
-from compilations import kinds_compiled
 from hypothesis import example, given
 from hypothesis import strategies as st
 
@@ -166,7 +165,7 @@ class TestByHand:
         on_whole_grid(self.GRID, look_at((10, 5), NORTH, (5, 5), (4, 10)), read_only)
         turned = np.full((10, 4, 2), 0.5).T
         on_whole_grid(self.GRID, look_at((10.5, 5.5), 0.5, (2.5, 1.5), (4, 10)), turned)
-        assert kinds_compiled(_seen_by) == [1]
+        assert _seen_by.compiled_for == 1
 
 
 class TestProperties:
