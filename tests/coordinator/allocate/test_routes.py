@@ -350,6 +350,8 @@ class TestTimeToSpare:
         found = team.found(team.time_m2ps(0.5))
         assert found.alone_m2 == pytest.approx(np.maximum(team.alone_m2 - team.alone_s * second_m2, 0.0))
         assert found.later_m2ps == pytest.approx(max(0.0, team.later_m2ps - second_m2))
+        dear = team.found(team.time_m2ps(5.0))
+        assert (dear.alone_m2.tolist(), dear.later_m2ps) == ([0.0, 0.0], 0.0)
 
 
 class TestTurningRound:
