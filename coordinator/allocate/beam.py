@@ -85,7 +85,7 @@ def best_routes(team: Found, beam: int) -> list[list[int]]:
 def _room(team: Found, beam: int) -> tuple[Plans, Ahead]:
     """For all plans that a search may come to, in which nobody has begun, and for what they may go on with."""
     nodes, helpers, strips = team.table.shape[1], team.free_s.size, team.rank.size
-    most = 2 + beam * (strips + helpers + 1)  # each turn serves a strip, or ends a helper; the last is to work on
+    most = 2 + beam * (strips + helpers - 1)  # each turn serves a strip, or ends a helper; the last is to work on
     plans = Plans(
         np.full((most, helpers), nodes - 1),
         np.zeros((most, helpers), dtype=np.bool_),
@@ -100,10 +100,11 @@ def _room(team: Found, beam: int) -> tuple[Plans, Ahead]:
 def _search(team: Found, plans: Plans, ahead: Ahead, beam: int) -> IntArray:
     """`Plans.turn` of the best plan. Each plan of each beam is gone on with to the deadline by what brings most a
     second, and the best of all that come of it is taken; a plan of the next beam that goes on just so stands for the
-    one that it has come from. In the first of `plans` nobody has begun; the last is worked on."""
-    most, spare, ahead_of_spare = plans.gained_m2.size, _plan(plans, plans.gained_m2.size - 1), _ahead(ahead, 0)
-    heirs, begins = np.full(most, NONE), np.zeros(most + 1, np.int64)  # of each turn the first plan
-    turn, begins[1] = begins[0], 1  # a 0 of the array's type: for a plain one all would be compiled once more
+    one that it has come from. In the first of `plans` nobody has begun; the last is worked on. `begins`: of each turn
+    the first plan."""
+    heirs, begins = np.full(plans.gained_m2.size, NONE), np.zeros(plans.gained_m2.size + 1, np.int64)
+    turn, begins[1] = begins[0], 1  # a 0 of the array's type: for a plain one what it is given to is compiled once more
+    spare, ahead_of_spare = _plan(plans, plans.gained_m2.size - 1), _ahead(ahead, turn)
     while begins[turn] < begins[turn + 1]:
         begins[turn + 2] = _grow(team, plans, begins[turn], begins[turn + 1], ahead, beam, turn, heirs)
         turn += 1
@@ -168,7 +169,8 @@ def _grow(team: Found, plans: Plans, first: int, end: int, ahead: Ahead, beam: i
     strip, their `turn`th; of those that are alike one. None where nothing can be gained any more. Returns where they
     end. `heirs`: of each plan that of these which serves what brings most a second, if one does."""
     strips, helpers = team.rank.size, team.free_s.size
-    ranks, places, count = np.empty(ALIKE * beam), np.empty(ALIKE * beam, np.int64), 0
+    ranks, places = np.empty(ALIKE * beam), np.zeros(ALIKE * beam, np.int64)
+    count = places[0]
     still, nexts = np.empty(strips + 1), np.empty(end - first, np.int64)
     for row in range(end - first):
         plan, its_ahead = _plan(plans, first + row), _ahead(ahead, row)

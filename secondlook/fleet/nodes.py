@@ -27,6 +27,8 @@ CLOCK, WORLD, COORDINATOR, RECORDER, OBSERVER = (
 )
 HUB = WORLD
 """The host that is the hub of `secondlook run`: the world's process, which holds the clock, too."""
+PLAN = ("coordinator.", "vehicle_agent.")
+"""Where what plans, and calls what is compiled, is made."""
 LONGEST_HOST = 80  # characters; a host names a file and a key too
 
 
@@ -85,11 +87,10 @@ def node_spec(role: Role, config: Any, own: str | None = None) -> NodeSpec:
 
 
 def make_node(node_id: str, spec: NodeSpec) -> Any:
-    """The node itself; raises NodeError where it cannot be made. What the coordinator calls is compiled then; vehicles
-    call so little of that that they do not load it before."""
+    """The node itself, with all compiled that one which plans calls; raises NodeError where it cannot be made."""
     try:
         node = spec.make()
-        if spec.factory == NODES[Role.COORDINATOR].factory:
+        if spec.factory.startswith(PLAN):
             compile_all()
         return node
     except (NodeError, *NO_FAILURES):

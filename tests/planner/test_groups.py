@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from compiling import needs_compiling
 from hypothesis import example, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
@@ -94,6 +95,7 @@ class TestByHand:
         with pytest.raises(ValueError, match="block"):
             label_groups(np.ones((2, 2), dtype=bool), block)
 
+    @needs_compiling
     def test_is_compiled_for_one_kind_of_cells(self) -> None:
         read_only = cells_of("##. #.#")
         read_only.setflags(write=False)

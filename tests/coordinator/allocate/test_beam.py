@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import pickle
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from compiling import needs_compiling
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from situations import at_work, helper, open_strip, situations, strip
@@ -611,7 +611,7 @@ class TestSearch:
         assert best_routes(team._replace(later_m2ps=0.0), 3) == [[best]]
 
 
-@pytest.mark.skipif("NUMBA_DISABLE_JIT" in os.environ, reason="nothing is compiled")
+@needs_compiling
 def test_for_teams_of_all_kinds_the_search_is_compiled_once() -> None:
     """A second time would cost seconds, of the first offer of that kind."""
     home = WayHome((0.0, 0.0), Sailing(2.0, drift_mps=0.5, set_rad=0.0), 6.0)

@@ -3,13 +3,13 @@ side, by hand, and against every choice there is."""
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 
 import numpy as np
 import pytest
+from compiling import needs_compiling
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
@@ -509,7 +509,7 @@ def test_no_other_choice_of_windows_that_do_not_overlap_brings_more(
     assert all((one.first_row, one.end_row) == (0, rows) for one in found)
 
 
-@pytest.mark.skipif("NUMBA_DISABLE_JIT" in os.environ, reason="nothing is compiled")
+@needs_compiling
 def test_for_ground_of_all_kinds_the_cutting_is_compiled_once() -> None:
     """A second time would cost seconds, of the first cut of that kind."""
     contacts = np.ones((2, *GRID.shape))

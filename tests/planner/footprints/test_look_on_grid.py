@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 import pytest
+from compiling import needs_compiling
 from hypothesis import example, given
 from hypothesis import strategies as st
 
@@ -159,6 +160,7 @@ class TestByHand:
         assert not on_cells.any()
         assert np.zeros(self.GRID.shape)[rows, columns].shape == on_cells.shape
 
+    @needs_compiling
     def test_is_compiled_for_one_kind_of_looks(self) -> None:
         read_only = np.full((2, 4, 10), 0.5)
         read_only.setflags(write=False)
