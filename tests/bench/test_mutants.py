@@ -60,7 +60,7 @@ def test_what_an_edit_leaves_is_drawn_as_before() -> None:
 def test_a_file_is_tried_against_the_tests_of_its_name_then_those_nearby_then_those_of_its_room() -> None:
     first, nearby, others = tried_against("coordinator/cut/strips.py", ROOT)
     assert first == ["tests/coordinator/cut/test_strips.py"]
-    assert {"tests/coordinator/cut/test_cutting.py", mutants.GOLDEN} <= set(nearby)
+    assert {"tests/coordinator/cut/test_search.py", mutants.GOLDEN} <= set(nearby)
     assert "tests/coordinator/test_coordinator.py" in others
     assert len({*first, *nearby, *others}) == len(first) + len(nearby) + len(others)
     # It has no test of its name.
