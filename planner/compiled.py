@@ -8,6 +8,7 @@ environment, so that a debugger sees into it.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from functools import cached_property, update_wrapper
 from typing import Any, Generic, ParamSpec, TypeVar
@@ -39,10 +40,11 @@ class Compiled(Generic[P, R]):
         import numba  # noqa: PLC0415, see the class
 
         numba.extending.typeof_impl.register(Compiled)(_type_of)
-        try:
-            return numba.njit(cache=True)(self._function)
-        except RuntimeError:  # nowhere to keep it
-            return numba.njit(self._function)
+        made = numba.njit(self._function)
+        if not numba.config.DISABLE_JIT:
+            with contextlib.suppress(RuntimeError):  # nowhere to keep it
+                made._cache = _cache(self._function)
+        return made
 
     @property
     def compiled_for(self) -> int:
@@ -74,4 +76,24 @@ def _type_of(one: Compiled[..., Any], _: Any) -> Any:
     """Has a compiled function find another under its name."""
     from numba import typeof  # noqa: PLC0415, see the class
 
-    return typeof(one.made)  # type: ignore[no-untyped-call]
+    return typeof(one.made)
+
+
+def _cache(function: Callable[..., Any]) -> Any:
+    """Keeps what is compiled of a function as numba does. But what another version of ours has left there, and cannot
+    be read any more, is forgotten, and on a full disk nothing is kept."""
+    from numba.core.caching import FunctionCache  # noqa: PLC0415, see the class
+
+    class Cache(FunctionCache):  # type: ignore[misc]
+        def load_overload(self, *what: Any) -> Any:
+            try:
+                return super().load_overload(*what)
+            except Exception:  # it is unpickled before it is asked how old it is, and may name what is no more
+                self.flush()
+                return None
+
+        def save_overload(self, *what: Any) -> None:
+            with contextlib.suppress(OSError):
+                super().save_overload(*what)
+
+    return Cache(function)

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import ast
+import errno
 import importlib
+import pickle
 import subprocess
 import sys
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import numba
 import numpy as np
 import pytest
 from compiling import needs_compiling
@@ -57,17 +60,40 @@ def test_it_is_compiled_once_for_each_sort_of_arguments_and_kept_on_disk() -> No
 
 @needs_compiling
 def test_where_nothing_can_be_kept_it_is_compiled_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
-    import numba
+    def nowhere(function: Any) -> None:
+        raise RuntimeError(f"cannot cache function {function}: no locator available")
 
-    njit = numba.njit
+    monkeypatch.setattr("planner.compiled._cache", nowhere)
+    assert Compiled(twice._function)(1.5) == 3.0
 
-    def without(*functions: Any, cache: bool = False) -> Any:
-        if cache:
-            raise RuntimeError("cannot cache function: no locator available")
-        return njit(*functions)
 
-    monkeypatch.setattr(numba, "njit", without)
-    assert Compiled(twice._function).made(1.5) == 3.0
+@needs_compiling
+def test_what_another_version_has_left_is_forgotten_and_made_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    def of_another(*_: Any) -> None:
+        raise AttributeError("Can't get attribute 'Seen' on <module 'planner.footprints.cells'>")
+
+    def kept() -> list[Path]:
+        return [*Path(one.made.stats.cache_path).glob("test_compiled.twice-*.nbi")]
+
+    one = Compiled(twice._function)
+    one(1.5)
+    for file in kept():
+        file.write_bytes(pickle.dumps(numba.__version__) + b"what is no more")
+    one = Compiled(twice._function)
+    assert one(1.5) == 3.0
+    assert any(b"what is no more" not in file.read_bytes() for file in kept())
+    monkeypatch.setattr("numba.core.caching.FunctionCache.load_overload", of_another)
+    assert Compiled(twice._function)(1.5) == 3.0
+
+
+@needs_compiling
+def test_on_a_full_disk_it_is_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: Any) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("numba.core.caching.FunctionCache.save_overload", full)
+    one = Compiled(four_times._function)
+    assert one(np.ones((2, 3))[:, 1]).tolist() == [4.0, 4.0]
 
 
 def test_something_is_compiled() -> None:
