@@ -1,7 +1,8 @@
 """Which mutants of a file there are: the operators that `bench.mutants` tries, cosmic-ray's and two of ours, and where.
 
-Not tried is what is no behaviour (annotations, decorators, what only type checkers see, `strict=` of zip). Of what an
-operator may become one partner is tried that a reader might take for it: - for +, / for *, and for < both <= and >=.
+Not tried is what is no behaviour (annotations, decorators, what only type checkers see, `strict=` of zip, samples of
+arguments that something is compiled for). Of what an operator may become one partner is tried that a reader might take
+for it: - for +, / for *, and for < both <= and >=.
 """
 
 from __future__ import annotations
@@ -119,7 +120,7 @@ def no_behaviour(source: str) -> list[tuple[tuple[int, int], tuple[int, int]]]:
                 found.append(node.annotation)
             case ast.If(test=ast.Name(id="TYPE_CHECKING")):
                 found.append(node)
-            case ast.keyword(arg="strict"):
+            case ast.keyword(arg="strict") | ast.Call(func=ast.Attribute(attr="called_with")):
                 found.append(node)
     spans = []
     for one in found:

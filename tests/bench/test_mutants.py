@@ -27,6 +27,8 @@ class Some:
         self.value = min(more, 7)
         note(self)
         return {**more, "a": 1} if more < 3 else sum(zip(more, strict=True))
+
+note.called_with(lambda: (1 + 2,))
 """
 
 
