@@ -14,7 +14,7 @@ LOCK_ARGS ?=
 BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 INSTALL_PROJECT := $(PIP) install --quiet --no-deps --no-build-isolation --editable .
-COMPILE := $(BIN)/python -c "from secondlook.fleet.nodes import compile_nodes; compile_nodes()"
+COMPILE_NODES := $(BIN)/python -c "from secondlook.fleet.nodes import compile_nodes; compile_nodes()"
 
 .PHONY: run test docs docs-figures example pictures processors golden mutants lock release clean
 .DELETE_ON_ERROR:
@@ -128,7 +128,7 @@ release: .venv/.run-ready
 	@echo "Installing what running needs (requirements.lock)"
 	@$(PIP) install --quiet --require-hashes --requirement requirements.lock
 	@$(INSTALL_PROJECT)
-	@$(COMPILE)
+	@$(COMPILE_NODES)
 	@touch $@
 
 # What testing needs includes what running needs, so this makes both ready.
@@ -136,7 +136,7 @@ release: .venv/.run-ready
 	@echo "Installing what testing needs (requirements-dev.lock)"
 	@$(PIP) install --quiet --require-hashes --requirement requirements-dev.lock
 	@$(INSTALL_PROJECT)
-	@$(COMPILE)
+	@$(COMPILE_NODES)
 	@touch .venv/.run-ready $@
 
 # The locks hold for every Python >= 3.11 and every platform, each package in one version for all of them, and name no
