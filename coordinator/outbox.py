@@ -44,8 +44,8 @@ class Outbox:
         task = Task(action, strip.number, *strip.start, strip.heading_rad, strip.length_m, strip.width_m)
         self._waiting.append(Publication(TASK.key(vehicle=vehicle, number=self._tasks), task))
 
-    def unsay_offer(self, vehicle: str, number: int) -> None:
-        """A strip is not offered to a vehicle after all, where that has not gone out yet."""
+    def unsay_offer(self, vehicle: str, number: int) -> bool:
+        """A strip is not offered to a vehicle after all, where that has not gone out yet; returns whether it was so."""
 
         def offers_it(one: Publication) -> bool:
             task = one.message
@@ -53,7 +53,9 @@ class Outbox:
                 return False
             return task.strip == number and TASK.vehicle_of(one.key) == vehicle
 
+        before = len(self._waiting)
         self._waiting = [one for one in self._waiting if not offers_it(one)]
+        return len(self._waiting) < before
 
     def add_over(self, over: MissionOver) -> None:
         """Says that the mission is over."""

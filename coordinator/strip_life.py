@@ -56,6 +56,7 @@ class StripLife:
         self._answer_within_ms = answer_within_ms
         self._looks_within_ms = looks_within_ms
         self._looks_due_ms: dict[int, int] = {}  # of strips that are done by word alone
+        self._next_back_ms: dict[str, int] = {}  # until when a vehicle has what it was to do next, asked for all it has
         self._late_ms = LATE_MS + answer_within_ms - ANSWER_WITHIN_MS  # words that wait for slots are no delay of work
 
     def open(self, cut: Cut, now_ms: int, why: str) -> None:
@@ -100,14 +101,26 @@ class StripLife:
             self._move(record, StripState.OFFERED, now_ms, f"offered to {name}", name)
 
     def ask_back(self, strip: Strip, vehicle: KnownVehicle, now_ms: int) -> None:
-        """Tells a vehicle to give a strip back, and with it what it was to do next."""
+        """Tells a vehicle to give a strip back, and with it what it was to do next: that is open again once it has, as
+        until it is told so it may be done with the one and go on with the other; or where its answer is late."""
         name = vehicle.entry.vehicle
         vehicle.asked_back, vehicle.asked_back_ms = strip.number, now_ms
         self._outbox.add_task(TaskAction.GIVE_BACK, name, strip)
         following = self.ledger.next_of(name)
+        if following is None:
+            return
+        if self._outbox.unsay_offer(name, following.strip.number) or following.strip.number == strip.number:
+            self._open_next(vehicle, now_ms)
+        else:
+            self._next_back_ms.setdefault(name, now_ms + self._answer_within_ms)
+
+    def _open_next(self, vehicle: KnownVehicle, now_ms: int) -> None:
+        """Opens again what a vehicle was to do next."""
+        name = vehicle.entry.vehicle
+        following = self.ledger.next_of(name)
+        self._next_back_ms.pop(name, None)
         if following is not None:
-            self._outbox.unsay_offer(name, following.strip.number)  # of this moment, if there is one
-            self._move(following, StripState.OPEN, now_ms, f"{name} is told to give strip {strip.number} back")
+            self._move(following, StripState.OPEN, now_ms, f"{name} is told to give strip {vehicle.asked_back} back")
             self._sectors.assign_by(now_ms, following.window)
 
     def _ask_back_again(self, strip: Strip, vehicle: KnownVehicle, now_ms: int) -> None:
@@ -141,6 +154,8 @@ class StripLife:
             self._hear_next(status.strip, vehicle, now_ms)
             return
         record, name = self.ledger.get(status.strip), vehicle.entry.vehicle
+        if status.state is TaskState.GIVEN_BACK and vehicle.asked_back == status.strip:
+            self._open_next(vehicle, now_ms)
         if record is None or record.vehicle != name or record.state not in TAKEN:
             if status.state is TaskState.DONE:  # by one that counted as lost: the map tells what is left
                 if record is not None and self._was_served(record, vehicle):
@@ -184,6 +199,11 @@ class StripLife:
                 if record.vehicle == name:
                     self._move(record, StripState.OPEN, now_ms, f"{name} is lost: nothing heard of it")
                     self._sectors.cut_by(now_ms, [record.window])
+        for name, due_ms in [*self._next_back_ms.items()]:
+            if self.ledger.next_of(name) is None:
+                del self._next_back_ms[name]
+            elif now_ms >= due_ms:
+                self._open_next(self._fleet.vehicles[name], now_ms)
         for record in self._unanswered():
             if now_ms - record.since_ms >= self._answer_within_ms:
                 self._fleet.vehicles[record.vehicle].note_silence()
@@ -196,8 +216,9 @@ class StripLife:
             if now_ms >= offer.due_ms:
                 late = f"{record.vehicle} has not served it, which was expected by {offer.service.ends_s:.0f} s"
                 self.ask_back(record.strip, vehicle, now_ms)
+                self._open_next(vehicle, now_ms)
                 vehicle.note_failure(record.window)
-                if record.state in TAKEN:  # what it was to do next is open again by that it is asked back
+                if record.state in TAKEN:  # else it was its next, and is open again
                     self._move(record, StripState.OPEN, now_ms, late)
                 self._sectors.cut_by(now_ms, [record.window])
 
@@ -206,6 +227,7 @@ class StripLife:
         yield from (one.since_ms + self._answer_within_ms for one in self._unanswered())
         yield from (self._of(one)[1].due_ms for one in self._answered())
         yield from self._looks_due_ms.values()
+        yield from self._next_back_ms.values()
 
     def _unanswered(self) -> list[StripRecord]:
         offered = self.ledger.in_state(StripState.OFFERED, StripState.NEXT)
@@ -316,6 +338,8 @@ class StripLife:
         """A vehicle says once more that it has no work: its last word on a strip that it still has here was lost, or
         what it had agreed to do next is forgotten."""
         name = vehicle.entry.vehicle
+        if name in self._next_back_ms:
+            self._open_next(vehicle, now_ms)
         for record in self._answered():
             if record.vehicle == name and vehicle.hear_word_of(record.strip.number, header):
                 if self._seen_share(record) >= COVERED_SHARE:

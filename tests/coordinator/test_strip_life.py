@@ -516,17 +516,50 @@ class TestOffers:
         lives.tell(HELPER, 1, TaskState.DONE, 9_000)
         assert sorted(lives.life.deadlines_ms()) == [89_000, late_ms - 1_000]
 
-    def test_who_is_told_to_give_one_back_does_no_other_next(self) -> None:
+    @staticmethod
+    def asked_back() -> Lives:
+        """A helper at a strip, with another to do next, that was asked for the one."""
         lives = Lives()
         lives.given(HELPER)
         lives.next_of(HELPER)
         lives.forget()
         lives.life.ask_back(lives.strip(1).strip, lives.vehicle(HELPER), 5_000)
+        return lives
+
+    def test_who_is_told_to_give_one_back_has_the_next_until_it_answers(self) -> None:
+        lives = self.asked_back()
         assert (lives.vehicle(HELPER).asked_back, lives.vehicle(HELPER).asked_back_ms) == (1, 5_000)
+        assert lives.said() == [(HELPER, TaskAction.GIVE_BACK, 1)]
+        assert (lives.states(), lives.due()) == ([UNDER_WAY, NEXT], [])
+        lives.tell(HELPER, 1, TaskState.GIVEN_BACK, 9_000)
         reason = f"{HELPER} is told to give strip 1 back"
-        assert lives.said() == [(HELPER, TaskAction.GIVE_BACK, 1), (reason, OPEN, 2)]
+        assert lives.said() == [(reason, OPEN, 2), (f"given back by {HELPER}", OPEN, 1)]
+        assert (Item.ASSIGN, 1, 9_000) in lives.due()
+
+    def test_who_was_done_before_it_was_told_so_goes_on_with_the_next(self) -> None:
+        lives = self.asked_back()
+        lives.tell(HELPER, 2, TaskState.ACCEPTED, 9_000)
+        assert lives.states() == [OPEN, ACCEPTED]
+        lives.life.find_overdue([], 60_000)
+        assert lives.strip(2).vehicle == HELPER
+
+    def test_what_it_was_to_do_next_is_open_again_where_its_answer_is_late(self) -> None:
+        lives = self.asked_back()
+        assert 30_000 in lives.life.deadlines_ms()
+        lives.life.ask_back(lives.strip(1).strip, lives.vehicle(HELPER), 12_000)  # once more: it is not had any longer
+        lives.life.find_overdue([], 29_999)
+        assert lives.states() == [UNDER_WAY, NEXT]
+        lives.life.find_overdue([], 30_000)
         assert lives.states() == [UNDER_WAY, OPEN]
-        assert lives.due() == [(Item.ASSIGN, 1, 5_000)]
+        assert 37_000 not in lives.life.deadlines_ms()
+
+    def test_so_it_is_where_it_says_that_it_has_no_work(self) -> None:
+        lives = self.asked_back()
+        lives.forget()
+        for at_ms in (9_000, 19_000):
+            lives.state(HELPER, Mode.IDLE, 0, at_ms)
+        assert lives.states() == [OPEN, OPEN]
+        assert lives.vehicle(HELPER).failures == 1  # its word on the one was lost
 
     def test_a_next_of_the_same_moment_is_not_offered_then(self) -> None:
         lives = Lives()
