@@ -128,6 +128,7 @@ release: .venv/.run-ready
 	@echo "Installing what running needs (requirements.lock)"
 	@$(PIP) install --quiet --require-hashes --requirement requirements.lock
 	@$(INSTALL_PROJECT)
+	@echo "Compiling what is worked on number by number"
 	@$(COMPILE_NODES)
 	@touch $@
 
@@ -136,6 +137,7 @@ release: .venv/.run-ready
 	@echo "Installing what testing needs (requirements-dev.lock)"
 	@$(PIP) install --quiet --require-hashes --requirement requirements-dev.lock
 	@$(INSTALL_PROJECT)
+	@echo "Compiling what is worked on number by number"
 	@$(COMPILE_NODES)
 	@touch .venv/.run-ready $@
 
