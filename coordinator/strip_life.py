@@ -118,7 +118,6 @@ class StripLife:
         """Opens again what a vehicle was to do next."""
         name = vehicle.entry.vehicle
         following = self.ledger.next_of(name)
-        self._next_back_ms.pop(name, None)
         if following is not None:
             self._move(following, StripState.OPEN, now_ms, f"{name} is told to give strip {vehicle.asked_back} back")
             self._sectors.assign_by(now_ms, following.window)
@@ -200,9 +199,7 @@ class StripLife:
                     self._move(record, StripState.OPEN, now_ms, f"{name} is lost: nothing heard of it")
                     self._sectors.cut_by(now_ms, [record.window])
         for name, due_ms in [*self._next_back_ms.items()]:
-            if self.ledger.next_of(name) is None:
-                del self._next_back_ms[name]
-            elif now_ms >= due_ms:
+            if now_ms >= due_ms:
                 self._open_next(self._fleet.vehicles[name], now_ms)
         for record in self._unanswered():
             if now_ms - record.since_ms >= self._answer_within_ms:
@@ -408,5 +405,7 @@ class StripLife:
         return vehicle, vehicle.offers[record.strip.number]
 
     def _move(self, record: StripRecord, state: StripState, now_ms: int, reason: str, vehicle: str = "") -> None:
+        if record.state is StripState.NEXT:
+            self._next_back_ms.pop(record.vehicle, None)
         self.ledger.move(record, state, now_ms, reason, vehicle)
         self._outbox.add_strip(record)

@@ -46,11 +46,6 @@ class Compiled(Generic[P, R]):
                 made._cache = _cache(self._function)
         return made
 
-    @property
-    def compiled_for(self) -> int:
-        """For how many sorts of arguments it has been compiled so far; of each it takes seconds."""
-        return len(getattr(self.made, "signatures", ()))
-
     def called_with(self, sample: Callable[[], tuple[Any, ...]]) -> None:
         """Tells what it is called with from without: arguments of just these types. See `compile_all`."""
         _called.append((self, sample))

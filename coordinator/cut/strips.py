@@ -52,6 +52,10 @@ class Cut(Counted):
     why: str = ""
 
 
+CHANGE = ("risk", "contacts", "worth", "sums", "first_row", "end_row", "value", "is_known")
+"""What of `Left` is another after a cut."""
+
+
 class Cutting:
     """Ground as windows are cut of it and flown, all along the tracks, or all across them."""
 
@@ -83,9 +87,7 @@ class Cutting:
     def copy(self) -> Cutting:
         """One that may be cut by itself."""
         new, left = copy.copy(self), self._left
-        own = {name: getattr(left, name).copy() for name in ("risk", "contacts", "worth", "sums")}
-        bands = {name: getattr(left, name).copy() for name in ("first_row", "end_row", "value", "is_known")}
-        new._left = left._replace(**own, **bands)
+        new._left = left._replace(**{name: getattr(left, name).copy() for name in CHANGE})
         return new
 
     def cut(self, price: float) -> list[Window]:

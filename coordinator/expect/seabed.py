@@ -32,8 +32,7 @@ class Seabed:
         self._cells = max(0, round(ABOUT_M / grid.cell_m))
         self._found: FloatArray = np.zeros(grid.shape)
         self._told: FloatArray = np.zeros(grid.shape)
-        self._has_learnt = False
-        self._learnt_about: tuple[FloatArray, FloatArray] | None = None
+        self._learnt_about: tuple[FloatArray, FloatArray] | None = None  # the means about each cell of both, if known
 
     def learn(self, window: Window, p_detect: FloatArray, typical: float) -> None:
         """Learns from a pass of a helper over a window's cells: the P_d that it found at each, shape of the window, 0
@@ -41,7 +40,7 @@ class Seabed:
         seen = p_detect > 0
         self._found[window.cells][seen] += p_detect[seen]
         self._told[window.cells][seen] += typical
-        self._has_learnt, self._learnt_about = True, None
+        self._learnt_about = None
 
     def shares(self, found_nats: FloatArray, expected_nats: FloatArray) -> tuple[FloatArray, FloatArray]:
         """What part of the P_d expected of a look is expected to be found, grid shape: of a primary's by its P(y), and
@@ -53,18 +52,12 @@ class Seabed:
         expected = -np.expm1(-expected_nats)
         found = np.where(expected_nats > 0, -np.expm1(-found_nats), 0.0)
         found_about, told_about = self._about(found), self._about(expected)
-        told, learnt_found, learnt_told = 0.0, *self._learnt()
-        if self._has_learnt:
-            told = float((self._told * ((found_about + DOUBT) / (told_about + DOUBT))).sum())
+        told = float((self._told * ((found_about + DOUBT) / (told_about + DOUBT))).sum())
         doubt = DOUBT_OF_HELPERS * self._found.size
         of_helpers = (float(self._found.sum()) + doubt) / (told + doubt)
-        return _shares(found_about, told_about, learnt_found, learnt_told, of_helpers)
-
-    def _learnt(self) -> tuple[FloatArray, FloatArray]:
-        """The means about each cell of what helpers found, and of what they were told to."""
         if self._learnt_about is None:
             self._learnt_about = self._about(self._found), self._about(self._told)
-        return self._learnt_about
+        return _shares(found_about, told_about, *self._learnt_about, of_helpers)
 
     def _about(self, values: FloatArray) -> FloatArray:
         """The mean over the cells about each, of those that there are."""
@@ -123,5 +116,5 @@ def _mean_of_columns(values: FloatArray, beside: int) -> FloatArray:
     return mean
 
 
-for _mean in (_mean_of_rows, _mean_of_columns):
-    _mean.called_with(lambda: (np.zeros((1, 1)), 1))
+_mean_of_rows.called_with(lambda: (np.zeros((1, 1)), 1))
+_mean_of_columns.called_with(lambda: (np.zeros((1, 1)), 1))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from compiling import needs_compiling
+from compiling import needs_compiling, times_compiled
 from hypothesis import example, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
@@ -101,7 +101,7 @@ class TestByHand:
         read_only.setflags(write=False)
         for cells in (read_only, read_only.T, read_only[:, ::2]):
             label_groups(cells, 2)
-        assert _labels.compiled_for == 1
+        assert times_compiled(_labels) == 1
 
 
 class TestProperties:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapely
-from compiling import needs_compiling
+from compiling import needs_compiling, times_compiled
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
@@ -185,4 +185,4 @@ class TestProperties:
 def test_is_compiled_for_one_kind_of_arguments() -> None:
     for cells in (cells_of("#.. ##. ###").T, cells_of("#.#.#. ######")[:, ::2]):
         outline(cells, 5)
-    assert _boundary.compiled_for == _without_notches.compiled_for == 1
+    assert times_compiled(_boundary) == times_compiled(_without_notches) == 1

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from compiling import needs_compiling
+from compiling import needs_compiling, times_compiled
 from hypothesis import example, given
 from hypothesis import strategies as st
 
@@ -167,7 +167,7 @@ class TestByHand:
         on_whole_grid(self.GRID, look_at((10, 5), NORTH, (5, 5), (4, 10)), read_only)
         turned = np.full((10, 4, 2), 0.5).T
         on_whole_grid(self.GRID, look_at((10.5, 5.5), 0.5, (2.5, 1.5), (4, 10)), turned)
-        assert _seen_by.compiled_for == 1
+        assert times_compiled(_seen_by) == 1
 
 
 class TestProperties:
