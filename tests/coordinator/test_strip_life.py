@@ -540,6 +540,7 @@ class TestOffers:
         lives = self.asked_back()
         lives.tell(HELPER, 2, TaskState.ACCEPTED, 9_000)
         assert lives.states() == [OPEN, ACCEPTED]
+        assert 30_000 not in lives.life.deadlines_ms()
         lives.life.find_overdue([], 60_000)
         assert lives.strip(2).vehicle == HELPER
 

@@ -91,9 +91,9 @@ def test_on_a_full_disk_it_is_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     def full(*_: Any) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
+    monkeypatch.setattr("numba.core.caching.FunctionCache.load_overload", lambda *_: None)
     monkeypatch.setattr("numba.core.caching.FunctionCache.save_overload", full)
-    one = Compiled(four_times._function)
-    assert one(np.ones((2, 3))[:, 1]).tolist() == [4.0, 4.0]
+    assert Compiled(twice._function)(1.5) == 3.0
 
 
 def test_something_is_compiled() -> None:
