@@ -11,18 +11,18 @@ class Arrivals:
 
     def __init__(self) -> None:
         self._incarnation = 0
-        self._tiles: dict[str, int] = {}
-        self._hotspots: dict[str, int] = {}
+        self._tiles = _Newest()
+        self._hotspots = _Newest()
 
     def note_tile(self, incarnation: int, key: str, version: int) -> None:
         """A tile has come, also one that fits no map."""
         if self._is_of_newest(incarnation):
-            self._tiles[key] = max(version, self._tiles.get(key, 0))
+            self._tiles.note(key, version)
 
     def note_hotspot(self, incarnation: int, key: str, revision: int) -> None:
         """A hotspot's word has come."""
         if self._is_of_newest(incarnation):
-            self._hotspots[key] = max(revision, self._hotspots.get(key, 0))
+            self._hotspots.note(key, revision)
 
     def lack(self, incarnation: int, state: AgentState) -> bool:
         """Whether something is missing of what the vehicle had said when it sent a state."""
@@ -30,13 +30,26 @@ class Arrivals:
             return False
         here = incarnation == self._incarnation
         return any(
-            told not in (0, tally(come.values() if here else ()))
+            told not in (0, tally([come.sum] if here else ()))
             for told, come in ((state.tiles_told, self._tiles), (state.hotspots_told, self._hotspots))
         )
 
     def _is_of_newest(self, incarnation: int) -> bool:
         if incarnation > self._incarnation:
             self._incarnation = incarnation
-            self._tiles.clear()
-            self._hotspots.clear()
+            self._tiles, self._hotspots = _Newest(), _Newest()
         return incarnation == self._incarnation
+
+
+class _Newest:
+    """The newest version of each thing that has come, and their sum."""
+
+    def __init__(self) -> None:
+        self.sum = 0
+        self._versions: dict[str, int] = {}
+
+    def note(self, key: str, version: int) -> None:
+        before = self._versions.get(key, 0)
+        if version > before:
+            self._versions[key] = version
+            self.sum += version - before

@@ -206,6 +206,7 @@ class Coordinator:
         same = before is not None and (before.mode, before.works_on) == (state.mode, state.works_on)
         self._dispatch.note_state(name, now_ms, does_another=not same)
         self._strips.hear_state(vehicle, header, state, now_ms, had_no_work=had_no_work)
+        self._end.note_state(vehicle, now_ms)
         ahead_ms = self.config.ahead_ms
         if ahead_ms and vehicle.is_at_a_strip and state.expected_end_ms > 0 and self.ledger.next_of(name) is None:
             for sector in self._sectors.about(vehicle):  # it is to have its next by then

@@ -15,7 +15,9 @@ from coordinator.sectors import Sectors
 from coordinator.strip_life import StripLife
 from coordinator.vehicles import KnownVehicle
 
-ASK_AFTER_MS, ASK_EVERY_MS = 1000, 10_000  # what is under way may take a little longer than the state that tells of it
+# Who lacks something is asked for it at first after a little, as what is under way may take longer than the state that
+# tells of it; then so often, and while primaries survey, which have much else to say, so often.
+ASK_AFTER_MS, ASK_EVERY_MS, ASK_WHILE_SURVEYING_MS = 1000, 10_000, 60_000
 SAY_AGAIN_AFTER_MS = (*range(10, 100, 10), *range(1000, 10_000, 1000))
 
 GOAL_REACHED = "the goal is reached"
@@ -49,11 +51,10 @@ class MissionEnd:
         self._outbox = outbox
 
     def find(self, now_ms: int) -> None:
-        """Finds whether the mission is over, and says so; asks for what has not arrived when every primary has
-        finished."""
+        """Finds whether the mission is over, and says so; asks for what has not arrived."""
         left, surveying = self._strips.unended, self._fleet.surveying
-        lacking = [] if surveying else self._fleet.lacking(now_ms)
-        self._ask(lacking, now_ms)
+        lacking = self._fleet.lacking(now_ms)
+        self._ask(lacking, now_ms, ASK_WHILE_SURVEYING_MS if surveying else ASK_EVERY_MS)
         returning = any(one.is_returning for one in self._fleet.vehicles.values())
         given_up = ", ".join(name for name, one in self._fleet.primaries.items() if one.is_given_up)
         given_up = f"; given up before the end of its survey: {given_up}" if given_up else ""
@@ -77,17 +78,24 @@ class MissionEnd:
         self._outbox.add_over(self.over)
         self._agenda.add(Item.SAY_OVER, now_ms + SAY_AGAIN_AFTER_MS[0])
 
-    def _ask(self, lacking: list[KnownVehicle], now_ms: int) -> None:
-        """Asks those of whom something has not arrived to tell it again, until all has; then it is cut by."""
+    def note_state(self, vehicle: KnownVehicle, now_ms: int) -> None:
+        """A vehicle's newest state may tell of something that has not arrived: soon it is asked for that."""
+        if vehicle.lacks and self._agenda.deadline_ms(Item.ASK_AGAIN) is None:
+            self._agenda.add(Item.ASK_AGAIN, now_ms + ASK_AFTER_MS)
+
+    def _ask(self, lacking: list[KnownVehicle], now_ms: int, every_ms: int) -> None:
+        """Asks those of whom something has not arrived to tell it again, until all has; then it is cut by, at once
+        where every primary has finished."""
         due_ms = self._agenda.deadline_ms(Item.ASK_AGAIN)
         if not lacking:
             if due_ms is not None:
                 self._agenda.strike(Item.ASK_AGAIN, due_ms)
-                self._sectors.cut_by(now_ms)
-        elif due_ms is None:
-            self._agenda.add(Item.ASK_AGAIN, now_ms + ASK_AFTER_MS)
-        elif self._agenda.strike(Item.ASK_AGAIN, now_ms):
-            self._agenda.add(Item.ASK_AGAIN, now_ms + ASK_EVERY_MS)
+                if not self._fleet.surveying:
+                    self._sectors.cut_by(now_ms)
+            return
+        asks = bool(self._agenda.strike(Item.ASK_AGAIN, now_ms))
+        self._agenda.add(Item.ASK_AGAIN, now_ms + (ASK_AFTER_MS if due_ms is None else every_ms))
+        if asks:
             for one in lacking:
                 if not one.lost:
                     self._outbox.add_task(TaskAction.TELL_AGAIN, one.entry.vehicle)

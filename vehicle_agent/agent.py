@@ -37,7 +37,6 @@ from vehicle_agent.endurance import Endurance
 log = logging.getLogger("secondlook.agent")
 
 REPORT_EVERY_MS = 10_000
-REPORTS_A_TILE = 2  # with every so many reports a tile goes out that has not changed, as it may have been lost
 STRAIGHT_IN_M = 100.0  # behind home lies the start of the way there, which tells the heading of arrival
 
 
@@ -65,7 +64,6 @@ class Agent:
         self._started_ms = 0
         self._now_ms = 0
         self._maneuvers = 0
-        self._reports = 0
         self._contacts = 0
         self._outbox: list[Publication] = []
         self._wake_ms: int | None = None
@@ -136,10 +134,6 @@ class Agent:
             self.turn_home(now_ms)
         else:
             self.report(now_ms)
-        self._reports += 1
-        if self._reports % REPORTS_A_TILE == 0:
-            assert self.coverage is not None
-            self._outbox.extend(self.coverage.one_again())
         return self._step()
 
     def on_run(self, run: RunInfo, now_ms: int) -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from operator import itemgetter
-
 import numpy as np
 
 from comms.node import Publication
@@ -78,13 +76,6 @@ class CoverageLayer:
                 published[:] = now
                 changed = True
         return changed
-
-    def one_again(self) -> list[Publication]:
-        """A tile of those that were said the fewest times since they changed, as it was said last: the oldest."""
-        if not self._said:
-            return []
-        tile, _ = min(self._said.items(), key=itemgetter(1))
-        return [self._say(tile)]
 
     def told(self) -> int:
         """The tally of the newest versions of all tiles that were said."""

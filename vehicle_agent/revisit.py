@@ -8,7 +8,6 @@ import math
 from comms.said.announcement import RunInfo
 from comms.said.messages import (
     FARTHEST_M,
-    Look,
     ManeuverState,
     ManeuverStatus,
     Mode,
@@ -49,8 +48,6 @@ class SecondLooks:
         self._rest = rest
         self._legs: list[Track] = []
         self._passes: list[Pass] = []
-        self._length_m = 0.0
-        self._swept_m = 0.0
         self._answers: dict[int, tuple[Strip, TaskState]] = {}
         self._status_number = 0
 
@@ -81,11 +78,6 @@ class SecondLooks:
             self._keep(strip)
         else:
             self._consider(strip, now_ms)
-
-    def on_look(self, look: Look) -> None:
-        """Counts what has been swept of the present leg."""
-        if self._agent.maneuver is not None and look.maneuver == self._agent.maneuver.number:
-            self._swept_m += self._agent.footprint.track_length_m(look.geometry)
 
     def on_maneuver(self, status: ManeuverStatus, now_ms: int) -> None:
         """Goes from leg to leg."""
@@ -120,11 +112,6 @@ class SecondLooks:
         if self.strip is not None:
             self._leave(TaskState.FAILED, now_ms, why)
 
-    def tell_progress(self) -> None:
-        """Says how far the strip under way is swept."""
-        if self.strip is not None and self._agent.mode is Mode.REVISIT:
-            self._tell(self.strip.number, TaskState.UNDER_WAY, self._agent.expected_end_ms)
-
     def _consider(self, strip: Strip, now_ms: int) -> None:
         """Goes to a strip, or tells why not."""
         agent = self._agent
@@ -141,8 +128,6 @@ class SecondLooks:
             return
         self.strip = strip
         self._legs, self._passes = list(sweep.legs), list(sweep.passes)
-        self._length_m = sum(leg.length_m for leg in sweep.legs)
-        self._swept_m = 0.0
         agent.mode = Mode.TRANSIT
         agent.works_on = strip.number
         agent.expected_end_ms = ends_ms
@@ -243,12 +228,9 @@ class SecondLooks:
         self._tell(strip.number, state, now_ms, reason)
 
     def _tell(self, number: int, state: TaskState, ends_ms: int, reason: str = "") -> None:
-        progress = 1.0 if state is TaskState.DONE else 0.0
-        if self.strip is not None and self.strip.number == number and self._length_m > 0:
-            progress = min(1.0, self._swept_m / self._length_m)
         self._status_number += 1
         key = TASK_STATUS.key(vehicle=self._agent.vehicle, number=self._status_number)
-        self._agent.publish(key, TaskStatus(number, state, progress, ends_ms, reason))
+        self._agent.publish(key, TaskStatus(number, state, ends_ms, reason))
 
 
 class _RefusedError(Exception):
@@ -281,10 +263,6 @@ class RevisitAgent(Agent):
         """Answers an offer, or gives a strip back."""
         self._looks.on_task(task, now_ms)
 
-    def on_look(self, look: Look, now_ms: int) -> None:
-        """Counts what has been swept of the present leg."""
-        self._looks.on_look(look)
-
     def on_maneuver(self, status: ManeuverStatus, now_ms: int) -> None:
         """Goes from leg to leg."""
         self._looks.on_maneuver(status, now_ms)
@@ -299,8 +277,3 @@ class RevisitAgent(Agent):
     def leave_work(self, now_ms: int) -> None:
         """Leaves what it has of a strip."""
         self._looks.leave(now_ms, BATTERY_TOO_LOW)
-
-    def report(self, now_ms: int) -> None:
-        """Adds the progress of a strip under way to the report."""
-        super().report(now_ms)
-        self._looks.tell_progress()

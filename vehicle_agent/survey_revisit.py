@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from comms.said.messages import Look, ManeuverStatus, Mode, Task
+from comms.said.messages import ManeuverStatus, Mode, Task
 from vehicle_agent.config import SurveyRevisitConfig
 from vehicle_agent.revisit import BATTERY_TOO_LOW, THE_MISSION_IS_OVER, SecondLooks
 from vehicle_agent.survey import SurveyAgent
@@ -19,11 +19,6 @@ class SurveyRevisitAgent(SurveyAgent):
     def on_task(self, task: Task, now_ms: int) -> None:
         """Answers an offer, or gives a strip back; none is taken before the survey is done."""
         self._looks.on_task(task, now_ms, busy="surveying" if self.ahead else "")
-
-    def on_look(self, look: Look, now_ms: int) -> None:
-        """Learns from the look as from any, and counts what has been swept of a strip."""
-        super().on_look(look, now_ms)
-        self._looks.on_look(look)
 
     def on_maneuver(self, status: ManeuverStatus, now_ms: int) -> None:
         """Goes from track to track, then from leg to leg."""
@@ -43,8 +38,3 @@ class SurveyRevisitAgent(SurveyAgent):
         """Leaves what is left of the survey, or what it has of a strip."""
         self._looks.leave(now_ms, BATTERY_TOO_LOW)
         super().leave_work(now_ms)
-
-    def report(self, now_ms: int) -> None:
-        """Adds the progress of a strip under way to the report."""
-        super().report(now_ms)
-        self._looks.tell_progress()

@@ -29,7 +29,7 @@ def unpack(packed: bytes) -> Any:
         raise WireError(f"not MessagePack: {error}") from None
 
 
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 PARTS = 7
 _START = (0x90 + PARTS, SCHEMA_VERSION, 0xCE)  # an array of so many parts, a small number, a uint 32
 _HEAD = struct.Struct(">3BI")

@@ -426,11 +426,10 @@ class TaskState(enum.Enum):
 
 @dataclass(frozen=True, slots=True)
 class TaskStatus:
-    """How a task stands. `progress`: share of the strip's length swept; `ends_ms`: when it expects to be done."""
+    """How a task stands. `ends_ms`: when it expects to be done."""
 
     strip: StripNumber
     state: TaskState
-    progress: Annotated[Probability, Fine(0.0)]
     ends_ms: Annotated[Milliseconds, Moment(), Fine(0)]
     reason: Annotated[Text, NotOverWater("")]
 

@@ -55,7 +55,7 @@ def test_what_stops_a_node_is_found(brief: Scenario, monkeypatch: pytest.MonkeyP
         on_message(self, received)
 
     monkeypatch.setattr(Recorder, "on_message", fails)
-    tally = fuzz(brief, seed=0, messages=1000, each=500, flights=range(100))
+    tally = fuzz(brief, seed=1, messages=1000, each=500, flights=range(100))
     assert tally.found
     assert all("recorder has failed" in one.what and "too many contacts" in one.what for one in tally.found)
 

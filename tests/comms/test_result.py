@@ -31,7 +31,7 @@ def task(number: int, action: TaskAction = TaskAction.TAKE) -> Outgoing:
 
 def status(number: int, state: TaskState = TaskState.ACCEPTED) -> Received:
     key = TASK_STATUS.key(vehicle="beta", number=number)
-    return Received(key, TASK_STATUS, "beta", Header("beta", 0, 0, 0), TaskStatus(number, state, 0, 0, ""))
+    return Received(key, TASK_STATUS, "beta", Header("beta", 0, 0, 0), TaskStatus(number, state, 0, ""))
 
 
 def test_from_a_strip_that_is_offered_at_once_to_its_acceptance() -> None:

@@ -319,9 +319,9 @@ class TestLateRepeatedAndReordered:
         hotspot = Hotspot(1, HotspotState.ACTIVE, box(*HOT), 1, 600, False, 0)
         mail = [
             received(f"agent/{PRIMARY}/hotspot/1", hotspot, sequence=50),
-            received(f"agent/{HELPER}/task_status/1", TaskStatus(1, TaskState.ACCEPTED, 0, 0, ""), sequence=50),
+            received(f"agent/{HELPER}/task_status/1", TaskStatus(1, TaskState.ACCEPTED, 0, ""), sequence=50),
             received(f"agent/{HELPER}/state", AgentState(Mode.TRANSIT, 1, 1, 0, 0, 0, 0), sequence=51),
-            received(f"agent/{HELPER}/task_status/2", TaskStatus(1, TaskState.UNDER_WAY, 0, 0, ""), sequence=52),
+            received(f"agent/{HELPER}/task_status/2", TaskStatus(1, TaskState.UNDER_WAY, 0, ""), sequence=52),
             received(f"agent/{HELPER}/state", AgentState(Mode.REVISIT, 1, 1, 0, 0, 0, 0), sequence=53),
         ]  # fmt: skip
         for one in mail:
@@ -358,7 +358,7 @@ class TestLateRepeatedAndReordered:
 
     def test_an_older_word_on_a_task_changes_nothing(self) -> None:
         told = with_a_helper()
-        refused = TaskStatus(1, TaskState.REFUSED, 0, 0, "busy")
+        refused = TaskStatus(1, TaskState.REFUSED, 0, "busy")
         told.node.hear(f"agent/{HELPER}/task_status/1", refused, sequence=0)
         told.settle()
         assert told.states() == {1: ACCEPTED}

@@ -410,9 +410,23 @@ class TestWhatHasNotArrived:
         began_ms = told.node.now_ms
         told.keep_alive([PRIMARY, HELPER], 25)
         asked_ms = [one.at_ms - began_ms for one in told.node.said if isinstance(one.message, Task)]
-        assert asked_ms == [1000, 11_000, 21_000]
+        assert asked_ms == [999, 10_999, 20_999]  # 1 s after the state that tells of more was heard
         assert set(told.tasks()) == {(PRIMARY, TaskAction.TELL_AGAIN, 0)}
         assert told.node.all(MissionOver) == []
+
+    def test_while_a_primary_surveys_it_is_asked_for_once_a_minute(self) -> None:
+        told = coordinator()
+        told.keep_alive([PRIMARY, HELPER], 1000)
+        told.state(PRIMARY, Mode.SURVEY, 1, tiles_told=ALL_TILES)
+        told.state(HELPER, Mode.IDLE)
+        began_ms = told.node.now_ms
+        told.keep_alive([PRIMARY, HELPER], 130)
+        asked_ms = [one.at_ms - began_ms for one in told.node.said if isinstance(one.message, Task)]
+        assert asked_ms == [1000, 61_000, 121_000]
+        assert set(told.tasks()) == {(PRIMARY, TaskAction.TELL_AGAIN, 0)}
+        told.layer(PRIMARY, np.full(GRID.shape, 0.1))
+        told.keep_alive([PRIMARY, HELPER], 130)
+        assert len(told.tasks()) == 3
 
     @pytest.mark.parametrize("is_badly_seen", [False, True])
     def test_when_it_has_come_it_is_cut_by_before_it_is_over(self, is_badly_seen: bool) -> None:

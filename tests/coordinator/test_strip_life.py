@@ -81,8 +81,8 @@ class TestALateAnswer:
 
     def test_an_old_word_on_the_one_does_not_count_after_a_newer_on_the_other(self) -> None:
         told = with_a_late_answer()
-        old = received(f"agent/{HELPER}/task_status/1", TaskStatus(1, TaskState.ACCEPTED, 0, 0, ""), sequence=900)
-        told.node.hear(f"agent/{HELPER}/task_status/2", TaskStatus(2, TaskState.ACCEPTED, 0, 0, ""), sequence=901)
+        old = received(f"agent/{HELPER}/task_status/1", TaskStatus(1, TaskState.ACCEPTED, 0, ""), sequence=900)
+        told.node.hear(f"agent/{HELPER}/task_status/2", TaskStatus(2, TaskState.ACCEPTED, 0, ""), sequence=901)
         told.node.hear_again(old)
         assert told.states() == {1: OPEN, 2: ACCEPTED}
         assert len(told.tasks()) == 2

@@ -54,7 +54,7 @@ def test_a_task_reaches_its_vehicle_alone_and_the_answer_comes_back() -> None:
     assert abs(told.message.start_x_m - 100.0) <= 0.25
     assert abs(told.message.length_m - 180.0) <= 0.5
     assert told.t_s == 0.0
-    waters.say("beta", "agent/beta/task_status/1", TaskStatus(7, TaskState.ACCEPTED, 0.0, 60_000, ""))
+    waters.say("beta", "agent/beta/task_status/1", TaskStatus(7, TaskState.ACCEPTED, 60_000, ""))
     waters.run(20_000)
     assert heard(waters, "ship") == [("agent/beta/task_status/1", "TaskStatus")]
     assert heard(waters, "alpha") == []
@@ -88,10 +88,10 @@ def test_of_states_the_newest_alone_is_said_and_no_old_one() -> None:
 def test_of_tasks_and_answers_of_one_strip_the_newest_of_a_kind_is_said() -> None:
     waters = Waters()
     waters.run(4100)  # alpha's slot has begun at 4 s, beta's begins at 8 s and 20 s
-    for number, progress in enumerate((0.1, 0.2, 0.3), start=1):
-        waters.say("beta", f"agent/beta/task_status/{number}", TaskStatus(7, TaskState.UNDER_WAY, progress, 0, ""))
+    for number, ends_ms in enumerate((10_000, 20_000, 30_000), start=1):
+        waters.say("beta", f"agent/beta/task_status/{number}", TaskStatus(7, TaskState.UNDER_WAY, ends_ms, ""))
         waters.say("coordinator", f"coord/task/beta/{number}", TAKE)
-    waters.say("beta", "agent/beta/task_status/4", TaskStatus(8, TaskState.REFUSED, 0.0, 0, ""))
+    waters.say("beta", "agent/beta/task_status/4", TaskStatus(8, TaskState.REFUSED, 0, ""))
     waters.say("coordinator", "coord/task/beta/4", replace(TAKE, action=TaskAction.GIVE_BACK))
     waters.run(60_000)
     assert sorted(heard(waters, "ship")) == [(f"agent/beta/task_status/{number}", "TaskStatus") for number in (3, 4)]
@@ -118,7 +118,7 @@ def test_a_word_on_a_task_goes_before_maps_and_is_said_again_before_them() -> No
         look = Look(number, number, 50.0 + number, 50.0, 0.0, 0.0, 1.0, 1.0, HALF, 5.0, 0.0, True, ())
         waters.say("world", "veh/beta/look", look)
     waters.run(40_000)
-    waters.say("beta", "agent/beta/task_status/1", TaskStatus(7, TaskState.DONE, 1.0, 40_000, ""))
+    waters.say("beta", "agent/beta/task_status/1", TaskStatus(7, TaskState.DONE, 40_000, ""))
     waters.run(100_000)
     words = heard(waters, "ship")
     assert words[0] == ("agent/beta/task_status/1", "TaskStatus")
@@ -166,7 +166,7 @@ def test_whatever_the_frames_and_whatever_is_lost_all_that_is_acknowledged_arriv
     expected: list[tuple[str, int]] = []
     for number in range(1, 13):
         waters.say("alpha", "agent/alpha/curve", replace(CURVE, track=number))
-        waters.say("beta", f"agent/beta/task_status/{number}", TaskStatus(number, TaskState.REFUSED, 0.5, 0, ""))
+        waters.say("beta", f"agent/beta/task_status/{number}", TaskStatus(number, TaskState.REFUSED, 0, ""))
         task = replace(TAKE, strip=number)
         waters.say("coordinator", f"coord/task/{('alpha', 'beta')[number % 2]}/{number}", task)
         expected.append(("TaskStatus", number))
@@ -186,10 +186,10 @@ def test_whatever_the_frames_and_whatever_is_lost_all_that_is_acknowledged_arriv
 def test_a_modem_that_is_started_anew_is_understood() -> None:
     waters = Waters()
     for number in range(1, 6):
-        waters.say("beta", f"agent/beta/task_status/{number}", TaskStatus(number, TaskState.DONE, 1.0, 0, ""))
+        waters.say("beta", f"agent/beta/task_status/{number}", TaskStatus(number, TaskState.DONE, 0, ""))
         waters.run(waters.now_ms + 24_000)
     waters.start("beta")
-    waters.say("beta", "agent/beta/task_status/6", TaskStatus(6, TaskState.DONE, 1.0, 0, ""))
+    waters.say("beta", "agent/beta/task_status/6", TaskStatus(6, TaskState.DONE, 0, ""))
     waters.run(waters.now_ms + 60_000)
     assert [key for key, _ in heard(waters, "ship")] == [f"agent/beta/task_status/{number}" for number in range(1, 7)]
 
@@ -201,7 +201,7 @@ def test_the_smallest_frames_hold_what_is_to_be_said_and_smaller_ones_are_refuse
     assert least == 4 + 2 + 2 + (polls is not None) + 1 + 1 + 1 + 3 + 1 + 8
     waters = Waters(frame_bits=least, polls=polls)
     waters.say("coordinator", "coord/task/beta/3", TAKE)
-    waters.say("beta", "agent/beta/task_status/1", TaskStatus(7, TaskState.ACCEPTED, 0.0, 60_000, ""))
+    waters.say("beta", "agent/beta/task_status/1", TaskStatus(7, TaskState.ACCEPTED, 60_000, ""))
     waters.run(1_000_000)
     assert sorted((to, type(one.message).__name__) for _, to, one in waters.heard) == [
         ("beta", "Task"), ("ship", "TaskStatus"),
@@ -210,17 +210,16 @@ def test_the_smallest_frames_hold_what_is_to_be_said_and_smaller_ones_are_refuse
         config_of("ship", frame_bits=least - 1, polls=polls)
 
 
-def test_how_far_a_strip_is_swept_is_not_said_again_because_another_word_was_said_between() -> None:
+def test_that_it_is_at_a_strip_is_not_said_again_because_another_word_was_said_between() -> None:
     waters = Waters()
-    under_way = TaskStatus(7, TaskState.UNDER_WAY, 0.0, 0, "")
-    for number, word in enumerate(
-        (under_way, replace(under_way, progress=0.2), TaskStatus(8, TaskState.NEXT, 0, 0, ""))
-    ):
+    under_way = TaskStatus(7, TaskState.UNDER_WAY, 0, "")
+    later = replace(under_way, ends_ms=400_000)
+    for number, word in enumerate((under_way, later, TaskStatus(8, TaskState.NEXT, 0, ""))):
         waters.say("beta", f"agent/beta/task_status/{number}", word)
         waters.run(waters.now_ms + 30_000)
     waters.say("coordinator", "coord/task/beta/1", replace(TAKE, strip=8, action=TaskAction.TAKE_NEXT))
     waters.run(waters.now_ms + 30_000)
-    waters.say("beta", "agent/beta/task_status/4", replace(under_way, progress=0.4))
+    waters.say("beta", "agent/beta/task_status/4", replace(under_way, ends_ms=500_000))
     waters.run(waters.now_ms + 60_000)
     told = [one.message for _, to, one in waters.heard if to == "ship" and isinstance(one.message, TaskStatus)]
     assert [(one.strip, one.state) for one in told] == [(7, TaskState.UNDER_WAY), (8, TaskState.NEXT)]
@@ -323,8 +322,8 @@ def test_a_state_that_a_word_on_a_task_has_overtaken_is_not_told(frame_bits: int
     waters.say("beta", "agent/beta/state", state(Mode.IDLE))
     if backwards:
         waters.run(33_000)  # it is on its way
-    waters.say("beta", "agent/beta/task_status/1", TaskStatus(7, TaskState.DONE, 1.0, 30_000, ""))
-    waters.say("beta", "agent/beta/task_status/2", TaskStatus(8, TaskState.ACCEPTED, 0.0, 200_000, ""))
+    waters.say("beta", "agent/beta/task_status/1", TaskStatus(7, TaskState.DONE, 30_000, ""))
+    waters.say("beta", "agent/beta/task_status/2", TaskStatus(8, TaskState.ACCEPTED, 200_000, ""))
     waters.say("beta", "agent/beta/state", state(Mode.TRANSIT, works_on=8))
     waters.run(50_000)
     if backwards:  # what was lost comes after what was said behind it
@@ -371,7 +370,7 @@ def test_though_it_refuses_a_strip_before(frame_bits: int) -> None:
     waters.run(300_000)
     waters.say("beta", "agent/beta/state", state(Mode.RETURNING))
     waters.run(303_000)
-    waters.say("beta", "agent/beta/task_status/1", TaskStatus(7, TaskState.REFUSED, 0.0, 0, "on its way home"))
+    waters.say("beta", "agent/beta/task_status/1", TaskStatus(7, TaskState.REFUSED, 0, "on its way home"))
     waters.run(550_000)
     told = [(at_ms, one.message.mode) for at_ms, to, one in waters.heard if isinstance(one.message, AgentState)]
     assert Mode.RETURNING in [mode for at_ms, mode in told]
@@ -480,7 +479,7 @@ def test_a_damaged_word_from_hand_to_hand_is_dropped() -> None:
 
 def test_what_comes_again_by_an_echo_or_late_is_told_once() -> None:
     waters = Waters()
-    waters.say("beta", "agent/beta/task_status/1", TaskStatus(1, TaskState.ACCEPTED, 0.0, 60_000, ""))
+    waters.say("beta", "agent/beta/task_status/1", TaskStatus(1, TaskState.ACCEPTED, 60_000, ""))
     waters.say("coordinator", "coord/task/beta/3", TAKE)
     waters.run(60_000)
     for _, sender, packet in list(waters.packets):

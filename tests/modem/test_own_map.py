@@ -26,7 +26,7 @@ def own_map(*, by_strips: bool = False, start: int = 0) -> OwnMap:
 
 
 def status(state: TaskState, strip: int = 7) -> TaskStatus:
-    return TaskStatus(strip, state, 0.5, 0, "")
+    return TaskStatus(strip, state, 0, "")
 
 
 def half_of_what_stretches_tell() -> list[CoverageTile]:

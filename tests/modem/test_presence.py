@@ -27,7 +27,7 @@ def place(presence: Presence, now_ms: int) -> tuple[float, float]:
 
 
 def status(state: TaskState, strip: int = 7) -> TaskStatus:
-    return TaskStatus(strip, state, 0.0, 0, "")
+    return TaskStatus(strip, state, 0, "")
 
 
 def test_on_a_track_it_goes_straight_on_until_that_ends() -> None:

@@ -29,7 +29,7 @@ from modem.frames import FrameForm
 
 CYCLE_MS = 12_000
 TAKE = Task(TaskAction.TAKE, 7, 100.0, 50.0, 0.0, 180.0, 40.0)
-DONE = TaskStatus(7, TaskState.DONE, 1.0, 0, "")
+DONE = TaskStatus(7, TaskState.DONE, 0, "")
 IDLE = AgentState(Mode.IDLE, 0, 1.0, 0, 0.0, 0.0, 0.0)
 TRACKS = tuple(PlannedTrack(number, 100.0, 100.0, 0.0, 100.0, 400.0, False) for number in range(1, 30))
 

@@ -33,7 +33,7 @@ def test_a_word_on_a_task_that_newer_ones_have_overtaken_tells_nothing_of_what_a
     def hear(sequence: int, strip: int, state: TaskState) -> None:
         header = Header(beta.vehicle, 0, sequence, 1_000)
         key = TASK_STATUS.key(vehicle=beta.vehicle, number=sequence)
-        told.hear(beta.vehicle, TASK_STATUS, Said(key, header, TaskStatus(strip, state, 0.5, 0, "")), 2_000)
+        told.hear(beta.vehicle, TASK_STATUS, Said(key, header, TaskStatus(strip, state, 0, "")), 2_000)
 
     state = AgentState(Mode.IDLE, 0, 0.9, 0, 100.0, 0.0, math.pi)
     told.hear(beta.vehicle, STATE, Said(STATE.key(vehicle=beta.vehicle), Header(beta.vehicle, 0, 1, 0), state), 0)
@@ -57,7 +57,7 @@ def test_a_state_that_was_reckoned_is_no_newer_than_a_word_that_was_said_before_
     told.hear(beta.vehicle, STATE, Said(key, Header(beta.vehicle, 0, 64, 1_000), state), 1_000)
     word = Header(beta.vehicle, 0, 640, 10_000)
     told.reckon(beta.vehicle, 12_000)
-    told.hear(beta.vehicle, TASK_STATUS, Said(key, word, TaskStatus(7, TaskState.ACCEPTED, 0.5, 0, "")), 13_000)
+    told.hear(beta.vehicle, TASK_STATUS, Said(key, word, TaskStatus(7, TaskState.ACCEPTED, 0, "")), 13_000)
     told.reckon(beta.vehicle, 24_000)
     headers = [header_of(one.message.payload) for one in told.take() if isinstance(one.message, Heard)]
     assert [one.sequence for one in headers] == [64, 65, 640, 641]
@@ -72,7 +72,7 @@ def test_what_a_word_tells_of_its_work_holds_since_it_was_said() -> None:
     idle = AgentState(Mode.IDLE, 0, 0.9, 0, 100.0, 0.0, 0.0)
     told.hear(beta.vehicle, STATE, Said(STATE.key(vehicle=beta.vehicle), Header(beta.vehicle, 0, 1, 0), idle), 0)
     header, key = Header(beta.vehicle, 0, 640, 10_000), TASK_STATUS.key(vehicle=beta.vehicle, number=1)
-    told.hear(beta.vehicle, TASK_STATUS, Said(key, header, TaskStatus(7, TaskState.ACCEPTED, 0.0, 0, "")), 20_000)
+    told.hear(beta.vehicle, TASK_STATUS, Said(key, header, TaskStatus(7, TaskState.ACCEPTED, 0, "")), 20_000)
     going = presence.at(20_000)
     assert going is not None
     assert going.mode is Mode.TRANSIT

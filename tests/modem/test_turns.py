@@ -120,7 +120,7 @@ def test_whatever_is_lost_all_that_is_acknowledged_arrives_once() -> None:
         lost = random.Random(frame_bits)
         waters = Waters(arrives=lambda *_: lost.random() < 0.7, polls=TIMES, frame_bits=frame_bits)  # noqa: B023
         for number in range(1, 9):
-            waters.say("beta", f"agent/beta/task_status/{number}", TaskStatus(number, TaskState.REFUSED, 0.5, 0, ""))
+            waters.say("beta", f"agent/beta/task_status/{number}", TaskStatus(number, TaskState.REFUSED, 0, ""))
             waters.say("coordinator", f"coord/task/beta/{number}", replace(TAKE, strip=number))
             waters.run(waters.now_ms + 9000)
         waters.run(waters.now_ms + 6_000_000)

@@ -21,7 +21,7 @@ class RefusesAll(RevisitAgent):
         """Says how a task stands."""
         self.answers += 1
         key = TASK_STATUS.key(vehicle=self.vehicle, number=self.answers)
-        self.publish(key, TaskStatus(task.strip, state, 0, 0, reason))
+        self.publish(key, TaskStatus(task.strip, state, 0, reason))
 
 
 class NeverMoves(RevisitAgent):

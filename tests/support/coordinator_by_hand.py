@@ -94,7 +94,7 @@ class Told:
 
     def status(self, name: str, strip: int, state: TaskState, reason: str = "", at_ms: int | None = None) -> None:
         """A helper's word on a strip."""
-        message = TaskStatus(strip, state, 0, 0, reason)
+        message = TaskStatus(strip, state, 0, reason)
         self.node.hear(f"agent/{name}/task_status/1", message, at_ms=at_ms)
 
     def plan(self, *tracks_x_m: float, revision: int = 1) -> None:

@@ -99,7 +99,7 @@ class Lives:
     ) -> None:
         """A vehicle's word on a strip."""
         number = strip if isinstance(strip, int) else strip.strip.number
-        status = TaskStatus(number, state, 0, 0, reason)
+        status = TaskStatus(number, state, 0, reason)
         self.life.hear_status(self.vehicle(name), header or self.header(name, now_ms), status, now_ms)
 
     def state(self, name: str, mode: Mode, works_on: int = 0, now_ms: int = 0) -> None:

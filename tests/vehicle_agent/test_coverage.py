@@ -109,22 +109,22 @@ def test_where_the_best_look_counts_a_cell_has_the_mean_of_its_bins(layer: Cover
     assert cells == pytest.approx(-np.log1p(-counts))
 
 
-def test_of_those_told_the_fewest_times_the_oldest_is_told_again() -> None:
+def test_of_those_told_the_fewest_times_the_oldest_are_told_again(monkeypatch: pytest.MonkeyPatch) -> None:
     layer = two_tiles()
-    assert [told(layer.one_again()) for _ in range(3)] == [[(FIRST, 1)], [(LAST, 2)], [(FIRST, 1)]]
+    monkeypatch.setattr(coverage, "MOST_AGAIN", 1)
+    assert [told(layer.again()) for _ in range(3)] == [[(FIRST, 1)], [(LAST, 2)], [(FIRST, 1)]]
     seen(layer)
     layer.changed_tiles()  # the first one anew, which counts as told once
-    assert told(layer.one_again()) == [(FIRST, 3)]
-    assert CoverageLayer("alpha", GRID).one_again() == []
+    assert told(layer.again()) == [(FIRST, 3)]
+    assert CoverageLayer("alpha", GRID).again() == []
 
 
-def test_who_asks_is_told_so_many_those_told_the_fewest_times_first(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_who_asks_is_told_all_those_told_the_fewest_times_first() -> None:
     layer = two_tiles()
-    layer.one_again()
-    assert told(layer.again()) == [(LAST, 2), (FIRST, 1)]
-    layer.one_again()
-    monkeypatch.setattr(coverage, "MOST_AGAIN", 1)
-    assert told(layer.again()) == [(FIRST, 1)]
+    assert told(layer.again()) == [(FIRST, 1), (LAST, 2)]
+    seen(layer)
+    layer.changed_tiles()
+    assert told(layer.again()) == [(FIRST, 3), (LAST, 2)]
 
 
 def test_who_asks_is_told_no_more_than_200_tiles_at_a_time() -> None:

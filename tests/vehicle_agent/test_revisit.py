@@ -117,7 +117,7 @@ class TestAnOffer:
         said = tell(agent, STRIP)
         status = agent.all(TaskStatus, said)[0]
         # From (100, 0) straight ahead: 45 m to the run-in, 5 m of it, 200 m along the strip, at 2 m/s.
-        assert status == TaskStatus(3, TaskState.ACCEPTED, 0, 125_001, "")
+        assert status == TaskStatus(3, TaskState.ACCEPTED, 125_001, "")
         assert agent.last(Maneuver) == Maneuver(1, ManeuverKind.FOLLOW, 100, 50, 100, 250, 5)
         state = agent.last(AgentState)
         assert (state.mode, state.works_on, state.expected_end_ms) == (Mode.TRANSIT, 3, 125_001)
@@ -216,7 +216,7 @@ class TestAWordRepeated:
         agent = revisit()
         tell(agent, STRIP)
         fly(agent, HELPER, agent.last(Maneuver), SEES_25_M)
-        assert (answer(agent, STRIP).state, agent.last(TaskStatus).progress) == (TaskState.DONE, 1.0)
+        assert answer(agent, STRIP).state is TaskState.DONE
         assert len(agent.all(Maneuver)) == 1
 
     def test_a_strip_done_but_laid_anew_is(self) -> None:
@@ -277,7 +277,7 @@ class TestAWordRepeated:
 
 
 class TestTheSweep:
-    def test_it_tells_its_progress_every_10_s(self) -> None:
+    def test_it_says_once_that_it_is_at_it_and_then_its_states_do(self) -> None:
         agent = revisit()
         tell(agent, STRIP)
         tell_status(agent, HELPER, 1, ManeuverState.ON_TRACK, 25_000)
@@ -285,20 +285,17 @@ class TestTheSweep:
         assert agent.last(AgentState).mode is Mode.REVISIT
         agent.hear(f"veh/{HELPER}/look", look(agent.last(Maneuver), 1, 0, 10, SEES_25_M), at_ms=50_000)
         said = agent.wait_until(60_500)
-        assert [(one.at_ms, one.message.progress) for one in said if isinstance(one.message, TaskStatus)] == [
-            (50_001, 0.25),  # 50 of 200 m
-            (60_001, 0.25),
-        ]
+        assert agent.all(TaskStatus, said) == []
+        assert {(one.mode, one.works_on) for one in agent.all(AgentState, said)} == {(Mode.REVISIT, STRIP.strip)}
 
-    def test_a_look_of_another_manoeuvre_is_no_progress(self) -> None:
+    def test_a_look_of_another_manoeuvre_is_coverage(self) -> None:
         agent = revisit()
         tell(agent, STRIP)
         tell_status(agent, HELPER, 1, ManeuverState.ON_TRACK, 25_000)
         stray = replace(look(agent.last(Maneuver), 1, 0, 10, SEES_25_M), maneuver=7)
         agent.hear(f"veh/{HELPER}/look", stray)
         agent.wait(10)
-        assert agent.last(TaskStatus).progress == 0
-        assert agent.all(CoverageTile)  # but coverage it is
+        assert agent.all(CoverageTile)
 
     def test_a_look_from_before_its_start_is_its_predecessors(self) -> None:
         config = RevisitConfig(HELPER, SEES, speed_mps=2, turn_radius_m=6, run_in_m=5, endurance_ms=14_400_000)
@@ -324,7 +321,7 @@ class TestTheSweep:
         assert CoverageTile in kinds[:at_state]
         assert set(kinds[at_state + 1 : -1]) == {CoverageTile}
         status, state = agent.last(TaskStatus), agent.last(AgentState)
-        assert (status.state, status.progress, status.ends_ms) == (TaskState.DONE, 1.0, agent.now_ms)
+        assert (status.state, status.ends_ms) == (TaskState.DONE, agent.now_ms)
         assert (state.mode, state.works_on, state.expected_end_ms) == (Mode.IDLE, 0, 0)
         agent.wait(60)
         assert agent.last(TaskStatus) is status
@@ -358,7 +355,7 @@ class TestGivingBack:
         assert answer(agent, give_back()).state is TaskState.GIVEN_BACK
         tell(agent, STRIP)
         status = answer(agent, give_back(9))
-        assert (status.strip, status.state, status.progress) == (9, TaskState.GIVEN_BACK, 0)
+        assert (status.strip, status.state) == (9, TaskState.GIVEN_BACK)
         assert agent.last(AgentState).works_on == STRIP.strip
         assert to_follow(agent) is not None
 
@@ -369,9 +366,7 @@ class TestGivingBack:
         fly(agent, HELPER, agent.last(Maneuver), SEES_25_M)
         back = give_back() if tells_where else Task(TaskAction.GIVE_BACK, STRIP.strip, 0, 0, 0, 0, 0)
         said = tell(agent, back)
-        assert [(one.strip, one.state, one.progress) for one in agent.all(TaskStatus, said)] == [
-            (STRIP.strip, TaskState.DONE, 1.0)
-        ]
+        assert [(one.strip, one.state) for one in agent.all(TaskStatus, said)] == [(STRIP.strip, TaskState.DONE)]
         assert agent.all(CoverageTile, said) != []
         elsewhere = replace(STRIP, start_x_m=STRIP.start_x_m + 100)
         assert answer(agent, replace(elsewhere, action=TaskAction.GIVE_BACK)).state is TaskState.GIVEN_BACK

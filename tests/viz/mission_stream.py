@@ -334,8 +334,8 @@ def _second_looks(stream: MissionStream, legs: list[Leg], end_s: int) -> None:
             p_detect = np.where(np.abs(grid.across_m - across) <= STRIP_WIDTH_M / 2, 0.75, 0.0)
             own.layer.add_look(rows, slice(0, grid.columns), np.repeat(p_detect[None], rows.stop - rows.start, axis=0))
             own.publish(min(time_s + REPORT_EVERY_S, sweep.end_s))
-            _task(stream, number, time_s + 5, TaskState.UNDER_WAY, sweep, progress=0.5)
-        _task(stream, number, sweep.end_s, TaskState.DONE, sweep, progress=1.0)
+            _task(stream, number, time_s + 5, TaskState.UNDER_WAY, sweep)
+        _task(stream, number, sweep.end_s, TaskState.DONE, sweep)
         _strip(stream, number, sweep.end_s + 1, StripState.DONE, sweep, vehicle=HELPER, revision=5)
         _state(stream, HELPER, sweep.end_s, Mode.IDLE, 0)
         withdrawn = Hotspot(2, HotspotState.WITHDRAWN, outline, 0.3, 560, growing=False, merged_into=0)
@@ -365,10 +365,8 @@ def _strip(
     stream.say("coordinator", time_s, STRIP, status, number=number)
 
 
-def _task(
-    stream: MissionStream, number: int, time_s: float, state: TaskState, leg: Leg, *, progress: float = 0.0
-) -> None:
-    status = TaskStatus(number, state, progress, leg.end_s * 1000, "")
+def _task(stream: MissionStream, number: int, time_s: float, state: TaskState, leg: Leg) -> None:
+    status = TaskStatus(number, state, leg.end_s * 1000, "")
     stream.say(HELPER, time_s, TASK_STATUS, status, vehicle=HELPER, number=stream.sequences.get(HELPER, 0))
 
 

@@ -185,7 +185,7 @@ def _states() -> st.SearchStrategy[AgentState]:
 def _task_statuses() -> st.SearchStrategy[TaskStatus]:
     strips = st.sampled_from([1, 1, 1, 2, 3])
     states = st.sampled_from([*TaskState, TaskState.ACCEPTED, TaskState.UNDER_WAY, TaskState.DONE])
-    return st.builds(lambda strip, state: TaskStatus(strip, state, 0.0, 0, ""), strips, states)
+    return st.builds(lambda strip, state: TaskStatus(strip, state, 0, ""), strips, states)
 
 
 def _tasks() -> st.SearchStrategy[Task]:

@@ -79,9 +79,9 @@ def test_a_state_and_a_status() -> None:
             "110",  # down the tracks, 4 + 2
         ]
     )
-    status = TaskStatus(5, TaskState.DONE, 1.0, SENT_MS, "in words")
+    status = TaskStatus(5, TaskState.DONE, SENT_MS, "in words")
     assert _bits(status) == "100101" + "011"
-    assert _got(status) == TaskStatus(5, TaskState.DONE, 0.0, 0, "")
+    assert _got(status) == TaskStatus(5, TaskState.DONE, 0, "")
 
 
 def test_of_a_curve_every_tenth_metre_crosses() -> None:

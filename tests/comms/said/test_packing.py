@@ -108,8 +108,8 @@ def test_a_state() -> None:
 
 
 def test_a_task_status() -> None:
-    status = TaskStatus(1, TaskState.DONE, 0.0, SENT_MS, "as \u00fcsual")
-    assert _bits(status) == "10001" + "011" + "0000000" + "101001011001"  # 2,048 + 601
+    status = TaskStatus(1, TaskState.DONE, SENT_MS, "as \u00fcsual")
+    assert _bits(status) == "10001" + "011" + "101001011001"  # 2,048 + 601
     assert _got(status) == replace(status, reason="")
 
 
@@ -224,12 +224,12 @@ FITTING: dict[type[Any], st.SearchStrategy[Any]] = {
     Task: st.builds(
         Task, st.sampled_from(TaskAction), numbers, places_m, places_m, headings, st.floats(0, 3535), st.floats(0, 300)
     ),
-    TaskStatus: st.builds(TaskStatus, numbers, st.sampled_from(TaskState), shares, moments, st.text(max_size=9)),
+    TaskStatus: st.builds(TaskStatus, numbers, st.sampled_from(TaskState), moments, st.text(max_size=9)),
     MissionOver: st.builds(MissionOver, st.text(max_size=9)),
     Contact: st.builds(Contact, places_m, places_m, st.floats(0, 40), shares, numbers),
 }
 HALF_STEPS = {"length_m": 0.5, "width_m": 0.5, "range_bin_m": 0.0} | dict.fromkeys(
-    ["battery", "progress", "score", "mean_risk"], 0.5 / 127
+    ["battery", "score", "mean_risk"], 0.5 / 127
 )
 NOT_CROSSING = {"tiles_told": 0, "hotspots_told": 0, "note": "", "reason": ""}
 
@@ -417,10 +417,10 @@ def test_a_state_takes_at_most_64_bits() -> None:
     assert _put(replace(state, mode=Mode.IDLE, works_on=0, expected_end_ms=0)).bits == 60
 
 
-def test_a_task_takes_at_most_81_bits_and_its_status_40() -> None:
+def test_a_task_takes_at_most_81_bits_and_its_status_32() -> None:
     assert _put(replace(TAKE, strip=2031, length_m=2400.0, width_m=300.0)).bits == 81
     assert _put(replace(TAKE, strip=47)).bits == 69
-    assert _put(TaskStatus(1007, TaskState.UNDER_WAY, 0.4, SENT_MS + 5_500_000, "in words")).bits == 39
+    assert _put(TaskStatus(1007, TaskState.UNDER_WAY, SENT_MS + 5_500_000, "in words")).bits == 32
 
 
 def test_a_hotspot_of_eight_corners_takes_at_most_26_bytes() -> None:

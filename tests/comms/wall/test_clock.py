@@ -77,7 +77,7 @@ def test_a_clock_started_anew_takes_up_the_time_of_whoever_knows_it() -> None:
     [
         ("alpha", hello(sha="b" * 64), r"the router has another scenario than alpha, a{12} and not b{12}: .*"),
         ("gamma", hello(), "gamma is none of the scenario's nodes that the router knows"),
-        ("alpha", Hello("1", 99, SHA, False, None), "the fleet speaks schema version 2, alpha version 99"),
+        ("alpha", Hello("1", 99, SHA, False, None), "the fleet speaks schema version 3, alpha version 99"),
         ("beta", hello("2"), "another beta takes part already"),
     ],
 )

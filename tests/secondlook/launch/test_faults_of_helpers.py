@@ -81,6 +81,15 @@ def check(flight: Flight, *, but_served_twice: bool = False) -> dict[int, StripS
     return last
 
 
+def is_half_way(heard: Heard) -> bool:
+    """Whether the helper is over a strip, a third of the time that it expects to be."""
+    word = heard.last("agent/helper/task_status/*")
+    if word is None or not isinstance(word.message, TaskStatus) or word.message.state is not TaskState.UNDER_WAY:
+        return False
+    begun_ms = word.header.sent_ms
+    return heard.now_ms - begun_ms > (word.message.ends_ms - begun_ms) / 3
+
+
 def said_of_tasks(flight: Flight, vehicle: str) -> list[TaskState]:
     return [one.message.state for one in flight.heard if isinstance(one.message, TaskStatus) and one.vehicle == vehicle]
 
@@ -136,12 +145,8 @@ class TestBadHelpers:
 
     @pytest.mark.parametrize("back_after_s", [5, 60])
     def test_one_that_vanishes_half_way_and_comes_back(self, slow: MakeFleet, back_after_s: float) -> None:
-        def half_way(heard: Heard) -> bool:
-            status = heard.last("agent/helper/task_status/*")
-            return status is not None and isinstance(status.message, TaskStatus) and status.message.progress > 0.3
-
         fleet = slow(helpers=1)
-        fleet.run_until(half_way, timeout_s=5000)
+        fleet.run_until(is_half_way, timeout_s=5000)
         fleet.kill("helper")
         fleet.join("helper", at_s=fleet.now_s + back_after_s)
         flight = fleet.run()
@@ -300,12 +305,8 @@ class TestBadLinks:
         assert 9000 <= flight.heard.now_ms - over_ms <= 10_000
 
     def test_a_strip_that_was_swept_while_cut_off_is_not_swept_again(self, slow: MakeFleet) -> None:
-        def at_work(heard: Heard) -> bool:
-            status = heard.last("agent/helper/task_status/*")
-            return status is not None and isinstance(status.message, TaskStatus) and status.message.progress > 0.3
-
         fleet = slow(helpers=1)
-        fleet.run_until(at_work, timeout_s=5000)
+        fleet.run_until(is_half_way, timeout_s=5000)
         fleet.cut_off("helper", for_s=100)
         flight = fleet.run()
         check(flight)

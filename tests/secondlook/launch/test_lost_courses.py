@@ -39,6 +39,6 @@ def test_where_each_second_is_lost_they_soon_know_again(tmp_path: Path) -> None:
     assert_no_strip_lost(flight)
     assert_kept_apart(flight)
     off = off_m(flight, "helper")
-    assert max(off) > 10.0  # it was struck
+    assert max(off) > 1.0  # it was struck
     assert sum(one < 0.1 for one in off) > len(off) / 3
     assert max(off_m(flight, "primary")) < 0.1

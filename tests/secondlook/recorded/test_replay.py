@@ -166,7 +166,7 @@ def test_what_lies_behind_the_end_is_nothing_that_is_missed(run: Path, tmp_path:
             msgpack.packb(["secondlook-messages", 2]) + msgpack.packb(["run", b""]),
             "is of an older secondlook, which wrote",
         ),
-        (HEAD + record(2, "run", b"no message"), "holds what is no message: not a list of 7 parts of schema version 2"),
+        (HEAD + record(2, "run", b"no message"), "holds what is no message: not a list of 7 parts of schema version 3"),
     ],
 )
 def test_what_is_no_recording_is_refused(tmp_path: Path, content: bytes | None, sentence: str) -> None:

@@ -78,8 +78,8 @@ def test_strips_of_a_coordinator_that_is_gone_are_told_when_the_next_one_speaks(
     ]
 
 
-def task(state: TaskState, reason: str = "", progress: float = 0.0) -> Received:
-    return said(TASK_STATUS, TaskStatus(3, state, progress, 90_400, reason), vehicle="helper", number=7)
+def task(state: TaskState, reason: str = "") -> Received:
+    return said(TASK_STATUS, TaskStatus(3, state, 90_400, reason), vehicle="helper", number=7)
 
 
 def hotspot(number: int, state: HotspotState = HotspotState.ACTIVE, *, time_ms: int = TIME_MS) -> Received:
@@ -181,7 +181,7 @@ def test_only_changes_of_a_task_are_told() -> None:
     story = Story()
     assert story.tell(task(TaskState.ACCEPTED)) == line("strip 3 accepted, done at about 90 s")
     assert story.tell(task(TaskState.UNDER_WAY)) == line("strip 3 under way")
-    assert story.tell(task(TaskState.UNDER_WAY, progress=0.5)) == []
+    assert story.tell(task(TaskState.UNDER_WAY)) == []
     assert story.tell(task(TaskState.GIVEN_BACK)) == line("strip 3 given back")
     assert story.tell(task(TaskState.REFUSED, "battery")) == line("strip 3 refused: battery", warns=True)
     assert story.tell(task(TaskState.FAILED)) == line("strip 3 failed", warns=True)
