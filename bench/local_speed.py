@@ -59,7 +59,7 @@ PARTS: tuple[tuple[Any, str, str], ...] = (
     (SurveyAgent, "_find_hotspots", "survey agent, hotspots"),
     (comms.runner, "body_of", "encoding"),
     (comms.runner, "packed", "encoding"),
-    (comms.runner, "message_of", "decoding"),
+    (comms.runner, "message_again", "decoding"),
     (LockstepClock, "next_round", "clock"),
     (LockstepClock, "answer", "clock"),
     (MissionFiles, "write", "observer, files"),

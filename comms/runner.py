@@ -9,16 +9,15 @@ import sys
 import threading
 from collections import Counter
 from collections.abc import Iterable
+from contextvars import copy_context
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from comms.errors import NO_FAILURES, NodeError, in_words, one_line
 from comms.node import Listener, Node, Publication, Received, Step, checked_step
 from comms.said.announcement import RunInfo
-from comms.said.codec import CLOCK, Header, body_of, decode, message_of, packed
+from comms.said.codec import CLOCK, Header, body_of, decode, message_again, packed
 from comms.said.messages import Heard, Message
 from comms.said.routing import Route, Routing
 from comms.said.wire import WireError
@@ -52,7 +51,7 @@ class Outgoing(NamedTuple):
         """The message as its readers get it: what `Intake.open` makes of the payload. That is for a bus within one
         process, where unpacking and checking what has just been checked and packed would be the same work again."""
         topic = self.route.topic
-        message = message_of(self.body, topic.message)
+        message = message_again(self.body, topic.message)
         return Received(self.key, topic, self.route.vehicle, self.header, message, self.payload)
 
 
@@ -175,24 +174,28 @@ class GuardedNode:
         self, now_ms: int, mail: Iterable[Received] = (), *, start: bool = False, wake: bool = False
     ) -> list[Outgoing]:
         """Starts the node, gives it mail in order, and then with `wake` its wake-up if that is due; returns what it
-        publishes. Which errors numpy raises a node sets for itself alone. Raises NodeError."""
-        published: list[Publication] = []
+        publishes. Which errors numpy raises a node sets for itself alone, in a context of its own. Raises NodeError."""
         try:
-            with np.errstate():
-                if start:
-                    self._note("start", self._node.start(now_ms), published)
-                for received in mail:
-                    message = received.message
-                    opened = self._letters.open(message.key, message.payload) if type(message) is Heard else received
-                    if opened is not None:
-                        self._note("on_message", self._node.on_message(opened, now_ms), published)
-                if wake and self.is_due(now_ms):
-                    self._note("on_wake", self._node.on_wake(now_ms), published)
+            published = copy_context().run(self._told_by, now_ms, mail, start, wake)
         except (NodeError, *NO_FAILURES):
             raise
         except BaseException as error:
             raise failure_of(self.node_id, error, at_ms=now_ms) from error
         return [self.stamp(one.key, one.message, now_ms) for one in published]
+
+    def _told_by(self, now_ms: int, mail: Iterable[Received], start: bool, wake: bool) -> list[Publication]:
+        """What the node has to publish."""
+        published: list[Publication] = []
+        if start:
+            self._note("start", self._node.start(now_ms), published)
+        for received in mail:
+            message = received.message
+            opened = self._letters.open(message.key, message.payload) if type(message) is Heard else received
+            if opened is not None:
+                self._note("on_message", self._node.on_message(opened, now_ms), published)
+        if wake and self.is_due(now_ms):
+            self._note("on_wake", self._node.on_wake(now_ms), published)
+        return published
 
     def check_wake(self, now_ms: int) -> None:
         """Raises NodeError where the wake-up asked for is not later than now."""

@@ -70,7 +70,7 @@ class DubinsPath:
             left_m -= length_m
             if left_m <= 0:
                 break
-        return pose._replace(heading_rad=_turn(pose.heading_rad))
+        return Pose(pose.x_m, pose.y_m, _turn(pose.heading_rad))
 
     def poses_at(self, distances_m: FloatArray) -> FloatArray:
         """The poses at distances along the path, shape (n,); beyond either end, the pose at that end.

@@ -60,7 +60,7 @@ class VehicleLayer:
         if tile.version <= versions.get(incarnation, -1) or (incarnation < oldest and versions[oldest] == CLOSED):
             return False
         told: ToldTile | _Told = tile
-        if versions.keys() - {incarnation}:
+        if len(versions) > (incarnation in versions):  # others have told of it, too
             told = self._with_other_starts(place, window, incarnation, tile)
         versions[incarnation] = tile.version
         if len(versions) > MOST_STARTS:

@@ -67,7 +67,7 @@ class Course:
         BELIEVED_MS."""
         after_s = min(max(time_ms - self.begun_ms, 0), BELIEVED_MS) / 1000
         pose = along_arc(self.start, self.speed_mps * after_s, self.turn_radps * after_s)
-        return pose._replace(heading_rad=compass_rad(pose.heading_rad))
+        return Pose(pose.x_m, pose.y_m, compass_rad(pose.heading_rad))
 
 
 class Trace:

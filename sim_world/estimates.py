@@ -5,11 +5,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
 from planner.risk import HIGHEST_P_DETECT
-from planner.types import FloatArray
+from planner.types import BoolArray, FloatArray
 from sim_world.config import SensorConfig
 
 LOWEST_SEEN = 1e-4
@@ -40,6 +41,8 @@ class Estimates:
         self._track_error = 0.0
         self._walked = 0.0
         self._row_before: FloatArray | None = None
+        self._cells: tuple[FloatArray, ...] = ()
+        self._means: Means | None = None
 
     def begin_track(self, track: int) -> None:
         """A new track, the vehicle's so many-th."""
@@ -52,7 +55,8 @@ class Estimates:
         """The estimates of a look's cells, for the P_d that the vehicle's sonar has there as the vehicle knows it.
 
         The look is the vehicle's so many-th, over `looked_m` of track. `p_detect` has shape (sides, bins, range bins);
-        from how far the cells are seen, and how far the vehicle has then gone straight, broadcast to it.
+        from how far the cells are seen, and how far the vehicle has then gone straight, broadcast to it. What is the
+        same array as before has not changed.
         """
         if self._wrong.drift_per_km > 0.0:  # making a generator takes longer than using it
             step = float(self._draw("estimate_drift", look).standard_normal())
@@ -60,8 +64,10 @@ class Estimates:
         errors = self._noise.cell_errors(p_detect.shape, self._draw("noise", look))
         if self._wrong.noise_along_m is not None:
             self._correlate(errors, math.exp(-self._along_bin_m / self._wrong.noise_along_m))
-        believed = self._believed(p_detect, range_m, straight_m)
-        return self._noise.estimate(believed, self._track_error + self._walked, errors)
+        cells = p_detect, range_m, straight_m
+        if self._means is None or any(one is not before for one, before in zip(cells, self._cells, strict=True)):
+            self._cells, self._means = cells, self._noise.means(self._believed(*cells))
+        return self._noise.drawn(self._means, self._track_error + self._walked, errors)
 
     def _believed(self, p_detect: FloatArray, range_m: FloatArray, straight_m: FloatArray) -> FloatArray:
         wrong = self._wrong
@@ -78,6 +84,14 @@ class Estimates:
                 errors[:, row] *= math.sqrt(1.0 - kept * kept)
                 errors[:, row] += kept * self._row_before
             self._row_before = errors[:, row].copy()
+
+
+class Means(NamedTuple):
+    """Of a look's cells: which are not seen, and of those that are the logits of their P_d and the shifts of these."""
+
+    unseen: BoolArray
+    logits: FloatArray
+    shifts: FloatArray
 
 
 class PDetectEstimate:
@@ -110,16 +124,34 @@ class PDetectEstimate:
 
     def estimate(self, p_detect: FloatArray, shared_error: float, cell_errors: FloatArray) -> FloatArray:
         """Estimates for the P_d of a look's cells, same shape: 0 where that is 0, else within [1e-4, 0.999]."""
-        seen = p_detect > 0.0
-        logits = _logit(np.where(seen, p_detect, 0.5))
-        logits += np.interp(logits, self._truth_logits, self._shifts) + shared_error
-        logits += cell_errors
-        return np.where(seen, np.minimum(np.maximum(_sigmoid(logits), LOWEST_SEEN), HIGHEST_P_DETECT), 0.0)
+        return self.drawn(self.means(p_detect), shared_error, cell_errors.copy())
+
+    def means(self, p_detect: FloatArray) -> Means:
+        """What errors are added to, for the P_d of a look's cells."""
+        unseen = ~(p_detect > 0.0)
+        logits = _logit(np.where(unseen, 0.5, p_detect))
+        return Means(unseen, logits, np.interp(logits, self._truth_logits, self._shifts))
+
+    @staticmethod
+    def drawn(means: Means, shared_error: float, cell_errors: FloatArray) -> FloatArray:
+        """The estimates themselves, in the array of the cells' errors."""
+        shifts = means.shifts + shared_error
+        shifts += means.logits
+        estimates = cell_errors
+        estimates += shifts
+        _sigmoid(estimates, out=estimates)
+        np.maximum(estimates, LOWEST_SEEN, out=estimates)
+        np.minimum(estimates, HIGHEST_P_DETECT, out=estimates)
+        estimates[means.unseen] = 0.0
+        return estimates
 
 
 def _logit(p: FloatArray) -> FloatArray:
     return np.log(p / (1.0 - p))
 
 
-def _sigmoid(logit: FloatArray) -> FloatArray:
-    return 1.0 / (1.0 + np.exp(-logit))
+def _sigmoid(logit: FloatArray, out: FloatArray | None = None) -> FloatArray:
+    powers = np.exp(np.negative(logit, out=out), out=out)
+    powers += 1.0
+    sigmoid: FloatArray = np.divide(1.0, powers, out=powers)
+    return sigmoid

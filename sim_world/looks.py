@@ -8,15 +8,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from comms.node import random_stream
 from comms.said.messages import Look, LookContact, Maneuver, TruthLook
 from planner.types import BoolArray, FloatArray, Point
 from sim_world.config import VehicleConfig
 from sim_world.estimates import Estimates
 from sim_world.footprints import FOOTPRINTS
 from sim_world.footprints.swath import Swath
-from sim_world.sonar import SonarModel
+from sim_world.sonar import CurveSonar, SonarModel
 from sim_world.steadiness import STILL_WATER, Steadiness, Stream
+from sim_world.streams import NumberedStreams
 from sim_world.targets import NO_TARGETS, Recogniser, Targets
 from sim_world.vehicle import Stretch
 
@@ -64,7 +64,17 @@ class Looks:
         self._clutter = clutter
         self._recogniser = recogniser
         self._seed = seed
+        self._streams: dict[str, NumberedStreams] = {}
         self._estimates = Estimates(config.sensor, self._stream)
+        # Then nothing but the range tells how well a cell is seen, and of how well that is believed to be.
+        self._cells_are_alike = (
+            type(self._believed) is CurveSonar
+            and self._believed.minds_range_alone
+            and self._steadiness.leaves_all
+            and config.sensor.footprint == "side"
+            and config.sensor.estimate.bias_after_turn == 0.0
+        )
+        self._cells: Sight | None = None
         self._tracks = 0
         self._looks = 0
 
@@ -87,8 +97,10 @@ class Looks:
             stretch.bins,
             (sensor.along_bin_m, sensor.range_bin_m),
         )
-        places = swath.along_m, swath.lateral_m, swath.cell_centres()
-        cells = self._sight(self._believed, swath, *places, maneuver, time_s)
+        cells = self._cells
+        if cells is None or not self._cells_are_alike or cells.p_detect.shape[1] != swath.bins:
+            places = swath.along_m, swath.lateral_m, swath.cell_centres()
+            cells = self._cells = self._sight(self._believed, swath, *places, maneuver, time_s)
         contacts, truth = self._targets_passed(swath, maneuver, time_s)
         contacts += self._clutter_passed(swath, maneuver, time_s)
         if self._recogniser.raises_false_alarms:  # making a generator takes longer than using it
@@ -179,4 +191,7 @@ class Looks:
         return Sight(p_detect, range_m, bearing_rad, straight_m)
 
     def _stream(self, name: str, number: int) -> np.random.Generator:
-        return random_stream(self._seed, "world", self._config.vehicle, name, str(number))
+        streams = self._streams.get(name)
+        if streams is None:
+            streams = self._streams[name] = NumberedStreams(self._seed, "world", self._config.vehicle, name)
+        return streams(number)

@@ -40,7 +40,7 @@ class Arc:
     def pose_at(self, distance_m: float) -> Pose:
         """The pose at a distance from the start."""
         pose = along_arc(self.start, distance_m, distance_m * self.curvature)
-        return pose._replace(heading_rad=compass_rad(pose.heading_rad))
+        return Pose(pose.x_m, pose.y_m, compass_rad(pose.heading_rad))
 
 
 def arcs_of(way: Way) -> list[Arc]:

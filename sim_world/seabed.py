@@ -15,20 +15,12 @@ from comms.node import random_stream
 from planner.types import FloatArray, Point
 from sim_world.area import Ground
 from sim_world.config import SeabedConfig
-from sim_world.sonar import Seabed
+from sim_world.sonar import Seabed, UniformSeabed
 
 HALF_WEIGHT = math.sqrt(1.0 - math.sqrt(0.5))
 """Share of a half axis at which the weight is one half."""
 RIPPLE_SLENDERNESS = (0.25, 0.5)
 VEGETATION_SLENDERNESS = (0.7, 1.0)
-
-
-class UniformSeabed:
-    """A seabed that weakens nothing."""
-
-    def factor(self, x_m: FloatArray, y_m: FloatArray, bearing_rad: FloatArray | float) -> FloatArray:
-        """1 everywhere, in the arguments' common shape."""
-        return np.ones(np.broadcast(x_m, y_m, bearing_rad).shape)
 
 
 @dataclass(frozen=True)

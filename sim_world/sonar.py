@@ -21,6 +21,14 @@ class Seabed(Protocol):
         """Factor in (0, 1] at mission-frame positions seen along a compass bearing; the arguments broadcast."""
 
 
+class UniformSeabed:
+    """A seabed that weakens nothing."""
+
+    def factor(self, x_m: FloatArray, y_m: FloatArray, bearing_rad: FloatArray | float) -> FloatArray:
+        """1 everywhere, in the arguments' common shape."""
+        return np.ones(np.broadcast(x_m, y_m, bearing_rad).shape)
+
+
 class SufferedSeabed:
     """A seabed as a sonar sees it that loses but a `share`, [0, 1], of what the seabed takes away."""
 
@@ -58,6 +66,11 @@ class CurveSonar:
     def __init__(self, curve: DetectionCurve, seabed: Seabed) -> None:
         self._curve = curve
         self._seabed = seabed
+
+    @property
+    def minds_range_alone(self) -> bool:
+        """Whether P_d is the same wherever it looks."""
+        return type(self._seabed) is UniformSeabed
 
     def p_detect(
         self,

@@ -68,6 +68,11 @@ class Steadiness:
         self._current = current
 
     @property
+    def leaves_all(self) -> bool:
+        """Whether nothing is ever lost."""
+        return self._settling is None and self._half_at_crab_rad is None and not self.shears_looks
+
+    @property
     def shears_looks(self) -> bool:
         """Whether its swath lies askew to its track."""
         return self._current.carries

@@ -41,6 +41,7 @@ class Targets:
         self._x_m, self._y_m = places_m[:, 0], places_m[:, 1]
         self._kinds = kinds
         self._strengths = strengths
+        self._on_tracks: dict[tuple[float, float, float], tuple[FloatArray, FloatArray]] = {}
 
     def truth(self) -> TruthTargets:
         """The targets as they are published."""
@@ -49,7 +50,12 @@ class Targets:
 
     def passed(self, swath: Swath) -> Passed:
         """The targets that lie where a look sees."""
-        along_m, lateral_m = swath.to_track(self._x_m, self._y_m)
+        track = swath.origin_x_m, swath.origin_y_m, swath.heading_rad
+        if track not in self._on_tracks:  # as for all looks but a track's first
+            if len(self._on_tracks) >= MOST_TRACKS:
+                self._on_tracks.clear()
+            self._on_tracks[track] = swath.to_track(self._x_m, self._y_m)
+        along_m, lateral_m = self._on_tracks[track]
         numbers = swath.sees(along_m, lateral_m).nonzero()[0]
         return Passed(numbers, along_m[numbers], lateral_m[numbers], self._x_m[numbers], self._y_m[numbers])
 
@@ -63,6 +69,8 @@ class Targets:
         return self._strengths.chances(passed.numbers, p_detect, bearing_rad)
 
 
+MOST_TRACKS = 100
+"""For so many it is kept where all targets lie on them: vehicles look at one track after the other."""
 NO_TARGETS = Targets(np.empty((0, 2)), Alike(), Unshared())
 
 

@@ -111,7 +111,7 @@ class LockstepClock:
         self._due: dict[int, set[str]] = {}
         self._due_times: list[int] = []
         self._sent_to: dict[str, Counter[str]] = {node: Counter() for node in acting}
-        self._grown: dict[str, set[str]] = {node: set() for node in acting}
+        self._grown: dict[str, dict[str, int]] = {node: {} for node in acting}  # those of _sent_to that are news
         listening = [node.node_id for node in routing.roster if node.listens_only]
         self.watched: dict[str, Counter[str]] = {node: Counter() for node in listening}
         self.watched_bytes: dict[str, int] = dict.fromkeys(listening, 0)
@@ -129,27 +129,29 @@ class LockstepClock:
             route = self._routing.route(one.key)
             if route is None or route.writer != sender:
                 raise ValueError(f"{sender} has published {one.key}, which it may not write")
-            self.messages[route.topic.name] += 1
-            if route.topic is MISSION_OVER and self.over_ms is None:
+            topic = route.topic
+            self.messages[topic.name] += 1
+            if topic is MISSION_OVER and self.over_ms is None:
                 self.over_ms = self.now_ms
             for joiner, counts in self.said_to_joiners.items():
                 counts[sender] += joiner in route.readers
             readers = [node for node in route.readers if node not in self._absent] if self._absent else route.readers
             for reader in readers:
-                self._sent_to[reader][sender] += 1
-                self._grown[reader].add(sender)
-            if readers and route.topic.wakes:
-                self._make_due(readers, route.topic.due_ms(self.now_ms))
+                counts = self._sent_to[reader]
+                counts[sender] = self._grown[reader][sender] = counts[sender] + 1
+            if readers and topic.wakes:
+                self._make_due(readers, topic.due_ms(self.now_ms))
             for watcher in route.watchers:
                 self.watched[watcher][sender] += 1
                 self.watched_bytes[watcher] += one.size
         self._messages_in_second += len(sent)
 
     def _make_due(self, readers: Iterable[str], due_ms: int) -> None:
-        if due_ms not in self._due:
-            self._due[due_ms] = set()
+        due = self._due.get(due_ms)
+        if due is None:
+            due = self._due[due_ms] = set()
             heapq.heappush(self._due_times, due_ms)
-        self._due[due_ms].update(readers)
+        due.update(readers)
 
     def answer(self, node_id: str, wake_ms: int | None, sent: Sequence[Said]) -> None:
         """Takes a granted node's answer: the wake-up it wants next (in the future) and what it has published.
@@ -185,8 +187,9 @@ class LockstepClock:
             happenings = self._happen(next_ms)
             receivers = self._receivers(next_ms)
             woken = self._woken(next_ms)
-            acting = sorted(woken | receivers, key=self._places.__getitem__)
-            grants = tuple([self._grant(node_id, node_id in woken) for node_id in acting])
+            acting = woken | receivers
+            in_order = sorted(acting, key=self._places.__getitem__) if len(acting) > 1 else acting
+            grants = tuple([self._grant(node_id, node_id in woken) for node_id in in_order])
             if grants or happenings:  # else all receivers are frozen or gone
                 self._count_round(next_ms)
                 self.now_ms = next_ms
@@ -194,12 +197,12 @@ class LockstepClock:
 
     def _next_ms(self) -> int | None:
         """The next time at which anything may happen."""
-        times = [] if (wake_ms := self._first_wake_ms()) is None else [wake_ms]
-        if self._due_times:
-            times.append(self._due_times[0])
-        if self._happenings:
-            times.append(self._happenings[-1].at_ms)
-        return min(times, default=None)
+        next_ms = self._first_wake_ms()
+        if self._due_times and (next_ms is None or self._due_times[0] < next_ms):
+            next_ms = self._due_times[0]
+        if self._happenings and (next_ms is None or self._happenings[-1].at_ms < next_ms):
+            next_ms = self._happenings[-1].at_ms
+        return next_ms
 
     def _wake(self, node_id: str, wake_ms: int | None) -> None:
         """From now on this is the wake-up that a node wants."""
@@ -218,9 +221,11 @@ class LockstepClock:
 
     def _woken(self, now_ms: int) -> set[str]:
         """Those who are woken by now."""
-        woken = set[str]()
-        while (wake_ms := self._first_wake_ms()) is not None and wake_ms <= now_ms:
-            woken.add(heapq.heappop(self._wake_times)[1])
+        woken: set[str] = set()
+        while self._wake_times and self._wake_times[0][0] <= now_ms:
+            wake_ms, node_id = heapq.heappop(self._wake_times)
+            if self._wakes[node_id] == wake_ms and node_id not in self._frozen:
+                woken.add(node_id)
         return woken
 
     def _happen(self, now_ms: int) -> tuple[Happening, ...]:
@@ -268,9 +273,7 @@ class LockstepClock:
         return waiting - self._frozen
 
     def _grant(self, node_id: str, woken: bool) -> Grant:
-        counts, grown = self._sent_to[node_id], self._grown[node_id]
-        expected = {sender: counts[sender] for sender in grown}
-        grown.clear()
+        expected, self._grown[node_id] = self._grown[node_id], {}
         start = node_id in self._to_start
         self._to_start.discard(node_id)
         self._waiting.add(node_id)

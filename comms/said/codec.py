@@ -78,8 +78,14 @@ def body_of(message: Message) -> list[Any]:
 
 
 def message_of(body: Any, message_type: type[Message]) -> Message:
-    """The message of such a body, unpacked or not packed yet; raises WireError where it is not one of that type."""
+    """The message of such a body; raises WireError where it is not one of that type."""
     message: Message = record_of(message_type).decode(body)
+    return message
+
+
+def message_again(body: list[Any], message_type: type[Message]) -> Message:
+    """The message of a body that `body_of` has just made, as its readers get it."""
+    message: Message = record_of(message_type).again(body)
     return message
 
 

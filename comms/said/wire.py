@@ -39,7 +39,8 @@ _BRIEFLY.maxstring = _BRIEFLY.maxother = 60
 class Kind(Protocol):
     """How one field's value becomes a MessagePack value and back.
 
-    A kind of which there are many may have both written out as expressions too, see `Quick`.
+    A kind of which there are many may have both written out as expressions too, see `Quick`. One that is slow to decode
+    may have a method `again`, which decodes what `encode` has just made, and so need not be looked at.
     """
 
     def encode(self, value: Any) -> Any:
@@ -52,10 +53,11 @@ class Kind(Protocol):
 class Quick(NamedTuple):
     """A kind's conversions as Python expressions, which a record's codec is put together from: most of the time would
     go into calls, one for each field. `{got}` stands for what is converted and is to be evaluated once, `{slow}` for
-    the kind's own method, to which an expression leaves all that is not plain, and to say no."""
+    the kind's own method, to which an expression leaves all that is not plain, and to say no. `again`: see `Kind`."""
 
     encode: str
     decode: str
+    again: str = "{got}"
 
 
 @dataclass(frozen=True)
@@ -85,6 +87,7 @@ class Scaled:
         return Quick(
             f"(v * {steps}).__round__() if {low!r} <= (v := {{got}}) <= {high!r} else {{slow}}(v)",
             f"w if type(v := {{got}}) is int and {low!r} <= (w := v / {steps}) <= {high!r} else {{slow}}(v)",
+            f"{{got}} / {steps}",
         )
 
 
@@ -154,6 +157,9 @@ class Words:
             raise WireError(f"{_BRIEFLY.repr(text)} does not match {self.pattern.pattern}")
         return text
 
+    def again(self, wire: str) -> str:
+        return wire
+
 
 @dataclass(frozen=True)
 class Octets:
@@ -219,12 +225,16 @@ class Packed:
         size = _size_of(shape, self.most)
         if size * self._dtype.itemsize != len(packed):
             raise WireError(f"{len(packed)} bytes do not fill the shape {shape}")
-        array: NDArray[Any] = np.ndarray(shape, self._dtype, packed)
+        values = self.again(wire)
+        if size and self.steps_per_unit is not None and float(values.max()) > self.high:
+            raise WireError(f"an array's values are above {self.high}")
+        return values
+
+    def again(self, wire: list[Any]) -> NDArray[Any]:
+        array: NDArray[Any] = np.ndarray(wire[:-1], self._dtype, wire[-1])
         if self.steps_per_unit is None:
             return array
         values = array / self.steps_per_unit
-        if size and float(values.max()) > self.high:
-            raise WireError(f"an array's values are above {self.high}")
         values.setflags(write=False)  # one message may have several readers
         return values
 
@@ -253,6 +263,9 @@ class Mask:
         if len(packed) != (size + 7) // 8:
             raise WireError(f"{len(packed)} bytes do not fill the shape {shape}")
         return _unpacked(*shape, packed)
+
+    def again(self, wire: list[Any]) -> NDArray[np.bool_]:
+        return _unpacked(*wire)
 
 
 @lru_cache(maxsize=1024)  # most masks are one of few: all true, or all false
@@ -293,6 +306,9 @@ class Many:
             raise WireError(f"not a list of at most {self.most} entries")
         return tuple(wire) if self._are_plain(wire) else tuple(self.kind.decode(one) for one in wire)
 
+    def again(self, wire: list[Any]) -> tuple[Any, ...]:
+        return tuple(wire) if type(self.kind) is Whole else tuple(map(_again_of(self.kind), wire))
+
     def _are_plain(self, values: Sequence[Any]) -> bool:
         """Whether these are whole numbers within bounds, which are on the wire as they are: the same, and faster."""
         kind = self.kind
@@ -313,7 +329,7 @@ class Record:
             (name, kind.encode, kind.decode) for name, kind in kinds.items()
         )
         self._defaults = [kinds[one.name].encode(one.default) for one in fields(cls) if one.default is not MISSING]
-        self._encode, self._decode = _put_together(cls, kinds)
+        self._encode, self._decode, self._again = _put_together(cls, kinds)
         self._left_out = getattr(cls, "LEFT_OUT", 0)
 
     def encode(self, value: Any) -> list[Any]:
@@ -336,6 +352,10 @@ class Record:
             values = iter(wire)
             return self._name_the_field(lambda _name, _encode, decode: decode(next(values)))
 
+    def again(self, wire: list[Any]) -> Any:
+        """The value of what `encode` has just made; not looked at, which takes longer than all else."""
+        return self._again(*wire) if len(wire) == len(self.fields) else self.decode(wire)
+
     def _name_the_field(self, convert: Callable[[str, Callable[..., Any], Callable[..., Any]], Any]) -> list[Any]:
         # The slow second pass is taken only for a value that does not fit, to say which field it was.
         for name, encode, decode in self.fields:
@@ -346,21 +366,31 @@ class Record:
         raise AssertionError("a conversion that failed once passed the second time")
 
 
-def _put_together(cls: type[Any], kinds: dict[str, Kind]) -> tuple[Callable[[Any], list[Any]], Callable[..., Any]]:
-    """Two functions: from an object of a class to the list of its fields' wire forms, and from these to an object."""
+def _put_together(
+    cls: type[Any], kinds: dict[str, Kind]
+) -> tuple[Callable[[Any], list[Any]], Callable[..., Any], Callable[..., Any]]:
+    """Three functions: from an object of a class to the list of its fields' wire forms, from these to an object, and
+    from those that the first one has just made."""
     methods: dict[str, Any] = {"cls": cls}
-    to_wire, from_wire = [], []
+    to_wire, from_wire, again = [], [], []
     for name, kind in kinds.items():
         quick: Quick = getattr(kind, "quick", _SLOW)
-        methods |= {f"encode_{name}": kind.encode, f"decode_{name}": kind.decode}
+        methods |= {f"encode_{name}": kind.encode, f"decode_{name}": kind.decode, f"again_{name}": _again_of(kind)}
         to_wire.append(quick.encode.format(got=f"record.{name}", slow=f"encode_{name}"))
         from_wire.append(quick.decode.format(got=name, slow=f"decode_{name}"))
+        again.append(quick.again.format(got=name, slow=f"again_{name}"))
     encode = eval(f"lambda record: [{', '.join(to_wire)}]", methods)
-    decode = eval(f"lambda {', '.join(kinds)}: cls({', '.join(from_wire)})", methods)
-    return encode, decode
+    decode, once_more = (
+        eval(f"lambda {', '.join(kinds)}: cls({', '.join(some)})", methods) for some in (from_wire, again)
+    )
+    return encode, decode, once_more
 
 
-_SLOW = Quick("{slow}({got})", "{slow}({got})")
+def _again_of(kind: Kind) -> Callable[[Any], Any]:
+    return getattr(kind, "again", kind.decode)
+
+
+_SLOW = Quick("{slow}({got})", "{slow}({got})", "{slow}({got})")
 _RECORDS: dict[object, Record] = {}
 
 

@@ -141,10 +141,10 @@ def settled_cells(grid: GridSpec, ahead: Iterable[Ahead], reach: Reach, window: 
     settled = np.ones((its_along_m.size, its_across_m.size), dtype=np.bool_)
     for one in ahead:
         distance_m = np.abs(its_across_m - one.across_m)
-        columns = (distance_m >= reach.near_m - grid.cell_m) & (distance_m <= reach.far_m + grid.cell_m)
-        first = np.searchsorted(its_along_m, one.from_m - grid.cell_m, side="right")
-        behind_last = np.searchsorted(its_along_m, one.to_m + grid.cell_m)
-        settled[first:behind_last, columns] = False
+        beyond = (distance_m < reach.near_m - grid.cell_m) | (distance_m > reach.far_m + grid.cell_m)
+        first = its_along_m.searchsorted(one.from_m - grid.cell_m, side="right")
+        behind_last = its_along_m.searchsorted(one.to_m + grid.cell_m)
+        settled[first:behind_last] &= beyond
     return settled
 
 

@@ -69,12 +69,12 @@ class RunOptions:
     """`folder`: where the files of the run go; it exists. `drive`: what makes time go on, and what goes wrong on
     purpose; a node to which something is to happen has a process of its own. `processes`: see
     `secondlook.fleet.nodes.hosts_of_run`. `record`: with recording and messages.mpk. `events`: with events.jsonl.
-    `progress`: told the figures as the mission goes on. `live_pipe`: where the recorder shows the mission while it
-    runs, see `viz.live_server.LiveServer`. `watch`: told each message in the order of sending; by raising `RunStopped`
-    it ends the run early, which is no failure. `made`: told each node that acts under its id, when it is made in this
-    process, again if it is started anew. `patience_s`: wall time after which a node that does not answer is given up.
-    `outages`: of the link, on purpose, beside those of the scenario; there are none without a link. `lasts`: whether
-    the files have to outlast a loss of power, for which each is waited for until it is on the disk."""
+    `risk`: with risk.npz. `progress`: told the figures as the mission goes on. `live_pipe`: where the recorder shows
+    the mission while it runs, see `viz.live_server.LiveServer`. `watch`: told each message in the order of sending; by
+    raising `RunStopped` it ends the run early, which is no failure. `made`: told each node that acts under its id, when
+    it is made in this process, again if it is started anew. `patience_s`: wall time after which a node that does not
+    answer is given up. `outages`: of the link, on purpose, beside those of the scenario; there are none without a link.
+    `lasts`: whether the files have to outlast a loss of power, for which each is waited for until it is on the disk."""
 
     folder: Path
     bus: Bus = "zenoh"
@@ -82,6 +82,7 @@ class RunOptions:
     drive: Drive = field(default_factory=Lockstep)
     record: bool = True
     events: bool = True
+    risk: bool = True
     progress: Progress | None = None
     live_pipe: Path | None = None
     watch: Watch | None = None
@@ -110,6 +111,7 @@ def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
             options.folder,
             with_messages=options.record,
             with_events=options.events,
+            with_risk=options.risk,
             progress=options.progress,
             watch=options.watch,
             deck_ms=deck_ms_of(scenario.link),
@@ -149,7 +151,7 @@ def run_in_passing(
     missions the others are flown all the same."""
     try:
         with passing_folder() as folder:
-            few_files = RunOptions(folder, bus="local", record=False, events=False, lasts=False)
+            few_files = RunOptions(folder, bus="local", record=False, events=False, risk=False, lasts=False)
             return run_mission(scenario, replace(few_files, progress=progress, watch=watch))
     except RunFailedError:
         raise

@@ -26,7 +26,7 @@ class RunStopped(Stop):
 
 
 class Observer:
-    """A listener that writes messages.mpk, events.jsonl, each if it is asked to, and at the end risk.npz into `folder`.
+    """A listener that writes messages.mpk, events.jsonl, and at the end risk.npz into `folder`, each if it is asked to.
     Raises CannotWriteError.
 
     `messages` counts them by topic. `progress` is told the figures every 10 simulated seconds. `watch` is told each
@@ -40,6 +40,7 @@ class Observer:
         *,
         with_messages: bool,
         with_events: bool = True,
+        with_risk: bool = True,
         progress: Progress | None = None,
         watch: Watch | None = None,
         deck_ms: int = 0,
@@ -48,7 +49,7 @@ class Observer:
         self.metrics = Metrics()
         self.link = LinkFigures(deck_ms)
         self.messages: Counter[str] = Counter()
-        self._folder, self._lasts = folder, lasts
+        self._folder, self._with_risk, self._lasts = folder, with_risk, lasts
         self._files = MissionFiles(folder, with_messages=with_messages, with_events=with_events)
         self._progress = progress
         self._progress_due_ms = 0
@@ -72,7 +73,8 @@ class Observer:
             self._files.close()
         finally:
             self.metrics.close()
-            self._write_risk()
+            if self._with_risk:
+                self._write_risk()
 
     def _write_risk(self) -> None:
         """risk.npz: the fleet's residual risk, each vehicle's layer in levels, and where the cells are."""

@@ -10,8 +10,7 @@ from planner.footprints.wedge import ForwardLooking
 from planner.types import DetectionCurve, FloatArray
 from sim_world.config import SensorConfig, SettlingConfig, TargetsConfig, VehicleConfig
 from sim_world.looks import Looks
-from sim_world.seabed import UniformSeabed
-from sim_world.sonar import CurveSonar, Position, SonarModel
+from sim_world.sonar import CurveSonar, Position, SonarModel, UniformSeabed
 from sim_world.targets import Recogniser, make_targets
 from sim_world.vehicle import Stretch
 

@@ -17,8 +17,7 @@ from sim_world.estimates import Estimates
 from sim_world.kinds import Mixture
 from sim_world.layouts import Given
 from sim_world.looks import Looks
-from sim_world.seabed import UniformSeabed
-from sim_world.sonar import Seabed
+from sim_world.sonar import Seabed, UniformSeabed
 from sim_world.steadiness import STILL_WATER, Stream
 from sim_world.targets import NO_TARGETS, Recogniser, Targets, make_targets
 from sim_world.vehicle import Stretch
@@ -166,6 +165,43 @@ def test_how_far_it_has_gone_straight_counts_from_where_the_run_in_begins() -> N
     # Behind 50 m of run-in, and 2.5 m, 7.5 m, ...
     left = 1.0 - 0.4 * (1.0 - (50.0 + np.array([2.5, 7.5, 12.5, 17.5])) / 100.0)
     assert look.p_detect[1, :, 3] == pytest.approx(0.6 * left)
+
+
+class Even(UniformSeabed):
+    """One that weakens nothing, which nobody knows of it."""
+
+
+@pytest.mark.parametrize("settling", [None, SettlingConfig(0.5, 300.0)])
+@pytest.mark.parametrize("current", [STILL_WATER, Stream(0.7, 0.3, period_s=60.0, over_ground=False)])
+@pytest.mark.parametrize("bias_after_turn", [0.0, 0.4])
+@pytest.mark.parametrize("half_at_crab_rad", [None, 0.3])
+def test_over_an_even_seabed_each_look_tells_what_it_would_if_nobody_knew_that(
+    settling: SettlingConfig | None, current: Stream, bias_after_turn: float, half_at_crab_rad: float | None
+) -> None:
+    wrong = EstimateConfig(bias_at_reach=0.3, bias_after_turn=bias_after_turn, turn_m=200.0)
+    curve = DetectionCurve(np.array([10.0, 100.0]), np.array([0.6, 0.2]))
+    sensor = SensorConfig(curve, noise_cell=0.2, noise_track=0.1, estimate=wrong, half_at_crab_rad=half_at_crab_rad)
+    told = []
+    for seabed in (UniformSeabed(), Even()):
+        looks = Looks(
+            VehicleConfig("a", 0.0, 0.0, 0.0, 2.0, 6.0, 5.0, sensor, settling=settling),
+            sonar=sensor.sonar_over(seabed, "a"),
+            targets=make_targets(TARGETS, AREA, 1),
+            recogniser=Recogniser(sensor.curve, false_alarms_per_km2=0.0),
+            seed=1,
+            current=current,
+        )
+        stretches = [
+            replace(northward(x_m), first_along_m=along_m, bins=bins)
+            for x_m in (100.0, 160.0)
+            for along_m, bins in ((0.0, 4), (20.0, 4), (40.0, 2))
+        ]
+        told.append([looks.look(one, 10.0 * place, (0.0, 0.0), 0.0) for place, one in enumerate(stretches)])
+    for (one, its_truth), (other, truth) in zip(*told, strict=True):
+        assert np.array_equal(one.p_detect, other.p_detect)
+        assert one.p_detect.shape[1] in (2, 4)
+        assert one.contacts == other.contacts
+        assert (its_truth is None) == (truth is None)
 
 
 def test_targets_where_nothing_is_seen_are_not_told() -> None:

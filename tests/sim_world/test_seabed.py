@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sim_world.config import SeabedConfig
-from sim_world.seabed import HALF_WEIGHT, Patch, PatchySeabed, UniformSeabed, make_seabed
-from sim_world.sonar import SufferedSeabed
+from sim_world.seabed import HALF_WEIGHT, Patch, PatchySeabed, make_seabed
+from sim_world.sonar import SufferedSeabed, UniformSeabed
 
 AREA = ((0.0, 0.0), (1212.0, 0.0), (1212.0, 400.0), (0.0, 400.0))
 PATCHY = SeabedConfig("patchy", ripple_fields=7, vegetation_patches=7)

@@ -80,6 +80,19 @@ def test_each_target_beside_a_track_is_passed_by_exactly_one_of_its_looks(
         assert (number in seen) == (0.0 <= along_m < 420.0 and abs(lateral_m) <= 135.0)
 
 
+def test_what_is_passed_hangs_on_no_look_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sim_world.targets.MOST_TRACKS", 2)
+    targets = make_targets(TargetsConfig(300), AREA, 1)
+    for x_m, y_m, heading_rad in [(500.0, 0.0, 0.1), (500.0, 0.0, 0.2), (500.0, 9.0, 0.1), (450.0, 0.0, 0.1)] * 2:
+        swath = SideSwath.over(SHAPE, (x_m, y_m), heading_rad, 40.0, 20, (5.0, 5.0))
+        found, expected = targets.passed(swath), make_targets(TargetsConfig(300), AREA, 1).passed(swath)
+        assert found.numbers.tolist() == expected.numbers.tolist() != []
+        assert (found.along_m.tolist(), found.lateral_m.tolist()) == (
+            expected.along_m.tolist(),
+            expected.lateral_m.tolist(),
+        )
+
+
 def test_port_is_negative() -> None:
     targets = make_targets(TargetsConfig(1), AREA, 1)
     (target,) = targets.truth().targets

@@ -33,6 +33,7 @@ from secondlook.errors import UserError
 from secondlook.recorded import Activity, RecordedMission, RiskMap, StripRecord
 from secondlook.recorded.message_records import HEAD, record
 from secondlook.recorded.metrics import Metrics
+from secondlook.recorded.observer import Observer
 from secondlook.recorded.second_looks import strips
 from secondlook.recorded.vehicles import activities, tracks
 
@@ -93,6 +94,18 @@ def test_the_risk_map_at_the_end_is_the_runs_own(mission: RecordedMission, brief
     np.testing.assert_array_equal(risk.inside, written["inside"])
     np.testing.assert_array_equal(risk.grid.across_m, written["across_m"])
     assert risk.t_s == mission.end_s
+
+
+@pytest.mark.parametrize(("asked_for", "names"), [(True, ["risk.npz"]), (False, [])])
+def test_of_who_only_watches_nothing_is_left_but_what_is_asked_for(
+    mission: RecordedMission, tmp_path: Path, asked_for: bool, names: list[str]
+) -> None:
+    observer = Observer(tmp_path, with_messages=False, with_events=False, with_risk=asked_for)
+    for one in mission.messages():
+        observer.on_message(one)
+    observer.close()
+    assert [one.name for one in tmp_path.iterdir()] == names
+    assert observer.messages["mission_over"] == 1
 
 
 def test_the_risk_at_any_time_is_what_had_been_published_until_then(
