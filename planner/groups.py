@@ -9,16 +9,6 @@ from planner.compiled import compiled
 from planner.types import BoolArray, IntArray
 
 
-def neighbours(cells: BoolArray) -> BoolArray:
-    """The cells that share a side with one of the given, which may be among them."""
-    found = np.zeros_like(cells)
-    found[1:] |= cells[:-1]
-    found[:-1] |= cells[1:]
-    found[:, 1:] |= cells[:, :-1]
-    found[:, :-1] |= cells[:, 1:]
-    return found
-
-
 def label_groups(cells: BoolArray, block: int) -> tuple[NDArray[np.int32], int]:
     """Numbers the groups of cells that touch by their sides.
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 from numpy.typing import NDArray
 
-from planner.groups import _labels, label_groups, neighbours
+from planner.groups import _labels, label_groups
 from planner.types import BoolArray
 
 pictures = arrays(np.bool_, array_shapes(min_dims=2, max_dims=2, min_side=1, max_side=12))
@@ -51,11 +51,6 @@ def spiral(side: int) -> BoolArray:
         cells[low + 2 : high + 1, low] = True
         low, high = low + 2, high - 2
     return cells
-
-
-def test_neighbours_share_a_side_with_a_cell_and_are_no_cells_beyond_the_edge() -> None:
-    found = neighbours(cells_of("..... ..#.. ....# #...."))
-    assert found.tolist() == cells_of("..#.. .#.## #.##. .#..#").tolist()
 
 
 class TestByHand:
