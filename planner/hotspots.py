@@ -8,9 +8,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from planner.groups import label_groups
 from planner.outline import outline as outline_of
-from planner.patches import NumberArray, carried_on, compared
+from planner.patches import NumberArray, carried_on
 from planner.types import BoolArray, FloatArray, GridSpec, Point, Window
 
 MOST_VERTICES = 40
@@ -46,51 +45,22 @@ class _Cells:
     block: int
     least_area_m2: float
 
-    @classmethod
-    def of(
-        cls,
-        hot: BoolArray,
-        unsettled: BoolArray,
-        risk: FloatArray,
-        block: int,
-        least_area_m2: float,
-        before: _Cells | None,
-    ) -> tuple[_Cells, Window | None]:
-        """What they are made of now, and the blocks in which that is something else than before; None for none."""
-        now = cls(
-            np.array(risk, dtype=np.float64, order="C"), np.zeros(hot.shape, dtype=np.bool_), block, least_area_m2
-        )
-        is_alike = before is not None and (before.block, before.least_area_m2) == (block, least_area_m2)
-        beside = before if before is not None and is_alike else now
-        marked = (np.array(hot, order="C"), np.array(unsettled, order="C"), now.risk, now.growing)
-        bounds = compared(*marked, beside.risk, beside.growing)
-        if not is_alike:
-            return now, (slice(0, hot.shape[0]), slice(0, hot.shape[1]))
-        return now, None if bounds[1] < 0 else _blocks(bounds, block, hot.shape)
-
 
 def blocks_about(grid: GridSpec, inside: BoolArray, block_m: float = BLOCK_M) -> Window:
     """The rows and columns of the whole blocks, see `update_hotspots`, that hold all cells `inside`, shape
     `grid.shape`; none where there is no such cell."""
     if not inside.any():
         return slice(0, 0), slice(0, 0)
-    rows, columns = (np.flatnonzero(inside.any(axis=axis)) for axis in (1, 0))
-    bounds = int(rows[0]), int(rows[-1]), int(columns[0]), int(columns[-1])
-    return _blocks(bounds, _cells_a_block(grid, block_m), inside.shape)
+    block = _cells_a_block(grid, block_m)
+    rows, columns = (np.flatnonzero(inside.any(axis=axis)) // block * block for axis in (1, 0))
+    return (
+        slice(int(rows[0]), min(int(rows[-1]) + block, grid.rows)),
+        slice(int(columns[0]), min(int(columns[-1]) + block, grid.columns)),
+    )
 
 
 def _cells_a_block(grid: GridSpec, block_m: float) -> int:
     return max(1, int(block_m / grid.cell_m))
-
-
-def _blocks(bounds: tuple[int, int, int, int], block: int, shape: tuple[int, ...]) -> Window:
-    """The blocks, of so many cells a side, that hold all from a first to a last row and column, in an array of a
-    shape."""
-    first_row, last_row, first_column, last_column = (place // block * block for place in bounds)
-    return (
-        slice(first_row, min(last_row + block, shape[0])),
-        slice(first_column, min(last_column + block, shape[1])),
-    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,31 +139,40 @@ def update_hotspots(
         )
     if not 0 < block_m < np.inf:
         raise ValueError(f"a block's side must be finite and above 0, not {block_m} m")
-    block = _cells_a_block(grid, block_m)
-    cells, window = _Cells.of(hot, unsettled, risk, block, float(least_area_m2), previous.made_of)
+    block, least_area_m2 = _cells_a_block(grid, block_m), float(least_area_m2)
+    cells = _Cells(
+        np.array(risk, dtype=np.float64, order="C"), np.zeros(hot.shape, dtype=np.bool_), block, least_area_m2
+    )
+    before = previous.made_of
+    if before is None or (before.block, before.least_area_m2) != (block, least_area_m2):
+        before = _Cells(np.full(hot.shape, np.nan), cells.growing, block, least_area_m2)  # which nothing is like
     # No patch reaches from one block into another, so that where nothing is new they are what they were.
-    if window is None:
-        return HotspotUpdate(previous, (), {})
-    labels, count = label_groups(hot[window], block)
     found = carried_on(
-        labels,
-        (window[0].start, window[1].start),
-        count,
+        np.array(hot, order="C"),
+        np.array(unsettled, order="C"),
         cells.risk,
         cells.growing,
+        before.risk,
+        before.growing,
         previous.numbers,
         previous.next_number,
-        (grid.cell_area_m2, cells.least_area_m2),
+        block,
+        (float(grid.cell_area_m2), least_area_m2),
     )
+    first_row, end_row, first_column, _ = found.window
+    if first_row >= end_row:
+        return HotspotUpdate(previous, (), {})
     told = {}
-    first_cell = rows.start + window[0].start, columns.start + window[1].start
+    first_cell = rows.start + first_row, columns.start + first_column
     by_patch = (found.labels, found.number_of, found.sizes, found.risk_sums, found.is_growing)
     of_outlines = (found.is_reshaped, found.bounds)
     for label, number, size, risk_sum, growing, is_reshaped, bounds in zip(
         *(one.tolist() for one in (*by_patch, *of_outlines)), strict=True
     ):
         outline = (
-            _outline(grid, labels, label, bounds, first_cell) if is_reshaped else previous.hotspots[number].outline
+            _outline(grid, found.labels_there, label, bounds, first_cell)
+            if is_reshaped
+            else previous.hotspots[number].outline
         )
         told[number] = Hotspot(number, outline, round(risk_sum / size, 4), size, growing)
     withdrawn = {number: heir or None for number, heir in zip(found.gone.tolist(), found.heirs.tolist(), strict=True)}

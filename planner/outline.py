@@ -33,12 +33,19 @@ def outline(cells: BoolArray, most_vertices: int) -> FloatArray:
 @compiled
 def _vertices(cells: BoolArray, most_vertices: int) -> FloatArray:
     """The polygon before sides are laid about it: of more vertices where there are too few notches."""
-    rows, columns = cells.shape
-    padded = np.zeros((rows + 2, columns + 2), np.bool_)
-    padded[1:-1, 1:-1] = cells
-    corners = _boundary(padded.ravel(), columns + 2)
-    vertices: FloatArray = corners[_without_notches(corners, most_vertices)].astype(np.float64)
-    return vertices
+    wide = cells.shape[1] + 2
+    padded = np.zeros((cells.shape[0] + 2) * wide, np.bool_)
+    for row in range(cells.shape[0]):
+        for column in range(cells.shape[1]):
+            padded[(row + 1) * wide + column + 1] = cells[row, column]
+    corners = _boundary(padded, wide)
+    is_left = _without_notches(corners, most_vertices)
+    vertices, count = np.empty((len(corners), 2)), 0
+    for place in range(len(corners)):
+        if is_left[place]:
+            vertices[count, 0], vertices[count, 1] = corners[place, 0], corners[place, 1]
+            count += 1
+    return vertices[:count]
 
 
 _vertices.called_with(lambda: (np.ones((1, 1), dtype=np.bool_), 4))
