@@ -26,12 +26,29 @@ def outline(cells: BoolArray, most_vertices: int) -> FloatArray:
     Returns:
         Vertices (column, row) in units of cells, counterclockwise, the first not repeated; shape (n, 2).
     """
-    wide = cells.shape[1] + 2
-    padded = np.zeros((cells.shape[0] + 2, wide), dtype=np.bool_)
-    padded[1:-1, 1:-1] = cells
-    corners = _boundary(padded.ravel(), wide)
-    vertices = corners[_without_notches(corners, most_vertices)].astype(np.float64)
+    vertices = _vertices(np.array(cells, order="C"), most_vertices)
     return vertices if len(vertices) <= most_vertices else _sides_about(vertices, most_vertices)
+
+
+@compiled
+def _vertices(cells: BoolArray, most_vertices: int) -> FloatArray:
+    """The polygon before sides are laid about it: of more vertices where there are too few notches."""
+    wide = cells.shape[1] + 2
+    padded = np.zeros((cells.shape[0] + 2) * wide, np.bool_)
+    for row in range(cells.shape[0]):
+        for column in range(cells.shape[1]):
+            padded[(row + 1) * wide + column + 1] = cells[row, column]
+    corners = _boundary(padded, wide)
+    is_left = _without_notches(corners, most_vertices)
+    vertices, count = np.empty((len(corners), 2)), 0
+    for place in range(len(corners)):
+        if is_left[place]:
+            vertices[count, 0], vertices[count, 1] = corners[place, 0], corners[place, 1]
+            count += 1
+    return vertices[:count]
+
+
+_vertices.called_with(lambda: (np.ones((1, 1), dtype=np.bool_), 4))
 
 
 @compiled
@@ -91,10 +108,6 @@ def _without_notches(corners: IntArray, most_vertices: int) -> BoolArray:
         for beside in (one, other):
             areas[beside] = _area(corners, before[beside], beside, after[beside])
     return is_left
-
-
-_boundary.called_with(lambda: (np.array([False, False, True, False, False]), 1))
-_without_notches.called_with(lambda: (np.zeros((0, 2), dtype=np.int64), 4))
 
 
 @compiled

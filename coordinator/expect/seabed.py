@@ -61,7 +61,7 @@ class Seabed:
 
     def _about(self, values: FloatArray) -> FloatArray:
         """The mean over the cells about each, of those that there are."""
-        return sliding_mean(sliding_mean(values, self._cells, 0), self._cells, 1)
+        return sliding_mean(values, self._cells, self._cells)
 
 
 @compiled
@@ -82,39 +82,30 @@ def _shares(
 _shares.called_with(lambda: (*np.zeros((4, 1, 1)), 1.0))
 
 
-def sliding_mean(values: FloatArray, beside: int, axis: int) -> FloatArray:
-    """The mean over up to `beside` places before and behind each along an axis."""
-    if axis == 0:
-        return _mean_of_rows(values, beside)
-    return _mean_of_columns(values, beside)
-
-
 @compiled
-def _mean_of_rows(values: FloatArray, beside: int) -> FloatArray:
+def sliding_mean(values: FloatArray, rows_beside: int, columns_beside: int) -> FloatArray:
+    """The mean over up to so many rows before and behind each, and then over columns likewise; along an axis for which
+    that is below 0 nothing is done."""
     rows, columns = values.shape
-    total, mean = np.zeros((rows + 1, columns)), np.empty((rows, columns))
-    for row in range(rows):
-        for column in range(columns):
-            total[row + 1, column] = total[row, column] + values[row, column]
-    for row in range(rows):
-        first, end = max(row - beside, 0), min(row + beside + 1, rows)
-        for column in range(columns):
-            mean[row, column] = (total[end, column] - total[first, column]) / (end - first)
+    mean = values.copy()
+    if rows_beside >= 0:
+        total = np.zeros((rows + 1, columns))
+        for row in range(rows):
+            for column in range(columns):
+                total[row + 1, column] = total[row, column] + values[row, column]
+        for row in range(rows):
+            first, end = max(row - rows_beside, 0), min(row + rows_beside + 1, rows)
+            for column in range(columns):
+                mean[row, column] = (total[end, column] - total[first, column]) / (end - first)
+    if columns_beside >= 0:
+        so_far = np.zeros(columns + 1)
+        for row in range(rows):
+            for column in range(columns):
+                so_far[column + 1] = so_far[column] + mean[row, column]
+            for column in range(columns):
+                first, end = max(column - columns_beside, 0), min(column + columns_beside + 1, columns)
+                mean[row, column] = (so_far[end] - so_far[first]) / (end - first)
     return mean
 
 
-@compiled
-def _mean_of_columns(values: FloatArray, beside: int) -> FloatArray:
-    rows, columns = values.shape
-    total, mean = np.zeros(columns + 1), np.empty((rows, columns))
-    for row in range(rows):
-        for column in range(columns):
-            total[column + 1] = total[column] + values[row, column]
-        for column in range(columns):
-            first, end = max(column - beside, 0), min(column + beside + 1, columns)
-            mean[row, column] = (total[end] - total[first]) / (end - first)
-    return mean
-
-
-_mean_of_rows.called_with(lambda: (np.zeros((1, 1)), 1))
-_mean_of_columns.called_with(lambda: (np.zeros((1, 1)), 1))
+sliding_mean.called_with(lambda: (np.zeros((1, 1)), 1, 1))

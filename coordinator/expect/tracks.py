@@ -15,7 +15,7 @@ from coordinator.vehicles import KnownVehicle
 from planner.curve import NEWEST_CURVES, mean_curve
 from planner.footprints import footprint_of
 from planner.footprints.cells import EDGE_TOLERANCE_M
-from planner.types import DetectionCurve, FloatArray, GridSpec, SweepFrame
+from planner.types import BoolArray, DetectionCurve, FloatArray, GridSpec, SweepFrame
 
 ASSUMED_P_DETECT = 0.5
 """Of a pass, midway between the nadir gap and the range that tracks are spaced for, before anybody has measured any; it
@@ -62,6 +62,7 @@ class ExpectedTracks:
 
     def __init__(self, grid: GridSpec) -> None:
         self._grid = grid
+        self._ground = _Kept[_Ground]()
         self._beside = _Kept[_Beside]()
         self._laid = _Kept[_Nats | None]()
 
@@ -71,6 +72,7 @@ class ExpectedTracks:
         its tracks are spaced for."""
         arrays = np.zeros((3, *self._grid.shape))
         found = Tracks(*arrays)
+        self._ground.begin_round()
         self._beside.begin_round()
         self._laid.begin_round()
         for vehicle in primaries.values():
@@ -84,7 +86,11 @@ class ExpectedTracks:
         tracks: list[_Track] = [(_ends(track), points) for track in plan.tracks]
         if tracks and not _comes_near(self._grid, tracks, float(curve.range_m[-1])):
             return
-        beside = [self._beside.value(one, partial(_beside, self._grid, one[0], curve)) for one in tracks]
+        reach_m = float(curve.range_m[-1]) + EDGE_TOLERANCE_M
+        ground = [self._ground.value((one, reach_m), partial(_ground, self._grid, one, reach_m)) for one, _ in tracks]
+        beside = [
+            self._beside.value(one, partial(_beside, there, curve)) for one, there in zip(tracks, ground, strict=True)
+        ]
         passed_m = [_passed_m(track, vehicle, lead_m) for track in plan.tracks]
         for one, its_m in zip(beside, passed_m, strict=True):
             seen = one.flown(its_m)
@@ -106,6 +112,17 @@ class ExpectedTracks:
         total, largest = np.zeros((2, *self._grid.shape))
         _add_ahead((total, largest), beside, passed_m)
         return (_shifted(self._grid, plan, total), _shifted(self._grid, plan, largest)) if total.any() else None
+
+
+@dataclass(frozen=True, eq=False)
+class _Ground:
+    """A window of the grid beside a track: how far its cells lie from that and along it, and which ones lie between its
+    ends."""
+
+    window: tuple[slice, slice]
+    lateral_m: FloatArray
+    along_m: FloatArray
+    is_beside: BoolArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +169,8 @@ def _shifted(grid: GridSpec, plan: Plan, nats: FloatArray) -> FloatArray:
     run_along = bool(np.abs(ends - starts)[1].sum() >= np.abs(ends - starts)[0].sum())
     offsets_m = ((starts + ends) / 2)[0 if run_along else 1]
     apart_m = float(np.ptp(offsets_m)) / max(1, len(plan.tracks) - 1)
-    left = sliding_mean(np.exp(-nats), round(apart_m / 2 / grid.cell_m), 1 if run_along else 0)
+    beside = round(apart_m / 2 / grid.cell_m)
+    left: FloatArray = sliding_mean(np.exp(-nats), -1 if run_along else beside, beside if run_along else -1)
     return -np.log(np.maximum(left, np.finfo(np.float64).tiny))  # of more looks than there are numbers for
 
 
@@ -202,12 +220,11 @@ def _ends(track: PlannedTrack) -> _Ends:
     return track.start_x_m, track.start_y_m, track.end_x_m, track.end_y_m
 
 
-def _beside(grid: GridSpec, ends: _Ends, curve: DetectionCurve) -> _Beside:
-    """What a track makes of the window of the grid beside it."""
+def _ground(grid: GridSpec, ends: _Ends, reach_m: float) -> _Ground:
+    """Where the window of the grid beside a track lies that a sonar of a reach may see."""
     start_x_m, start_y_m, end_x_m, end_y_m = ends
     frame = _frame(ends)
     length_m = float(np.hypot(end_x_m - start_x_m, end_y_m - start_y_m))
-    reach_m = float(curve.range_m[-1]) + EDGE_TOLERANCE_M
     ends_m = (-EDGE_TOLERANCE_M, length_m + EDGE_TOLERANCE_M)
     corners = grid.frame.to_sweep(*frame.to_mission(np.array([-reach_m, reach_m] * 2), np.repeat(ends_m, 2)))
     columns, rows = (
@@ -216,5 +233,10 @@ def _beside(grid: GridSpec, ends: _Ends, curve: DetectionCurve) -> _Beside:
     )
     centres = grid.frame.to_mission(grid.across_m[columns][np.newaxis, :], grid.along_m[rows][:, np.newaxis])
     across_m, along_m = frame.to_sweep(*centres)
-    nats = -np.log1p(-curve.at(np.abs(across_m)))
-    return _Beside((rows, columns), along_m, np.where((along_m >= ends_m[0]) & (along_m <= ends_m[1]), nats, 0.0))
+    return _Ground((rows, columns), np.abs(across_m), along_m, (along_m >= ends_m[0]) & (along_m <= ends_m[1]))
+
+
+def _beside(ground: _Ground, curve: DetectionCurve) -> _Beside:
+    """What a track with a curve makes of the ground beside it."""
+    nats = -np.log1p(-curve.at(ground.lateral_m))
+    return _Beside(ground.window, ground.along_m, np.where(ground.is_beside, nats, 0.0))

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planner.hotspots import Hotspot, HotspotMap, HotspotUpdate, blocks_about, update_hotspots
-from planner.types import BoolArray, FloatArray, GridSpec, SweepFrame
+from planner.types import BoolArray, FloatArray, GridSpec, Point, SweepFrame
 
 GRID = GridSpec(SweepFrame(100, 200, 0), 5, columns=12, rows=6)
 NONE = np.zeros(GRID.shape, dtype=bool)
@@ -269,6 +269,10 @@ def cells_numbered(numbers: np.ndarray, number: int) -> frozenset[tuple[int, int
     return frozenset(zip(*(axis.tolist() for axis in np.nonzero(numbers == number)), strict=True))
 
 
+def outlines_of(found: HotspotMap) -> dict[frozenset[tuple[int, int]], tuple[Point, ...]]:
+    return {cells_numbered(found.numbers, number): one.outline for number, one in found.hotspots.items()}
+
+
 class TestProperties:
     GRID = GridSpec(SweepFrame(-30, 70, 0.6), 5, columns=33, rows=21)
 
@@ -293,6 +297,9 @@ class TestProperties:
             assert (anew.changed, list(anew.withdrawn)) == (now.changed, list(now.withdrawn))
             assert (anew.map.numbers == now.map.numbers).all()
             self.check_patches(now.map, hot, unsettled, risk)
+            none = HotspotMap.empty(self.GRID)
+            first = update_hotspots(self.GRID, hot, unsettled, risk, none, block_m=60, least_area_m2=75)
+            assert outlines_of(first.map) == outlines_of(now.map)
             self.check_numbers(now, before)
             # Who follows the reports alone knows the same hotspots.
             seen_last.update({hotspot.number: hotspot for hotspot in now.changed})

@@ -9,7 +9,7 @@ from compiling import needs_compiling, times_compiled
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
-from planner.outline import _boundary, _holds_any, _without_notches, outline
+from planner.outline import _holds_any, _vertices, outline
 from planner.types import BoolArray
 
 Corner = tuple[int, int]
@@ -185,4 +185,4 @@ class TestProperties:
 def test_is_compiled_for_one_kind_of_arguments() -> None:
     for cells in (cells_of("#.. ##. ###").T, cells_of("#.#.#. ######")[:, ::2]):
         outline(cells, 5)
-    assert times_compiled(_boundary) == times_compiled(_without_notches) == 1
+    assert times_compiled(_vertices) == 1

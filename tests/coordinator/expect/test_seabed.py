@@ -6,12 +6,13 @@ import math
 
 import numpy as np
 import pytest
+from compiling import needs_compiling, times_compiled
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from coordinator.cut.window import Window
-from coordinator.expect.seabed import LEAST_SHARE, MOST_OF_TOLD, Seabed
+from coordinator.expect.seabed import LEAST_SHARE, MOST_OF_TOLD, Seabed, sliding_mean
 from planner.types import FloatArray, GridSpec, SweepFrame
 
 GRID = GridSpec(SweepFrame(0, 0, 0), 5, 20, 30)  # 20 m are four cells to either side: nine in all
@@ -121,3 +122,27 @@ def test_whatever_is_found_shares_stay_within_bounds(found: FloatArray, expected
     assert ((share >= LEAST_SHARE) & (share <= 1 / LEAST_SHARE)).all()
     assert ((helpers > 0) & (helpers <= MOST_OF_TOLD)).all()
     assert math.isfinite(float(helpers.sum()))
+
+
+@given(
+    values=arrays.arrays(np.float64, arrays.array_shapes(min_dims=2, max_dims=2, max_side=9), elements=st.floats(0, 9)),
+    rows=st.integers(-1, 10),
+    columns=st.integers(-1, 10),
+)
+def test_the_mean_is_that_of_the_rows_beside_each_and_then_of_the_columns(
+    values: FloatArray, rows: int, columns: int
+) -> None:
+    def mean(along: FloatArray, beside: int) -> FloatArray:
+        return np.array([along[max(at - beside, 0) : at + beside + 1].mean(axis=0) for at in range(len(along))])
+
+    expected = mean(values, rows) if rows >= 0 else values
+    expected = mean(expected.T, columns).T if columns >= 0 else expected
+    before = values.copy()
+    assert sliding_mean(values, rows, columns) == pytest.approx(expected, abs=1e-12)
+    assert (values == before).all()
+
+
+@needs_compiling
+def test_the_mean_is_compiled_for_one_kind_of_arguments() -> None:
+    Seabed(GRID).shares(nats(0.25), nats(0.5))
+    assert times_compiled(sliding_mean) == 1
