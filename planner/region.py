@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from planner.area import SurveyArea
-from planner.compiled import compiled
 from planner.rounding import rounded
 from planner.types import BoolArray, FloatArray, GridSpec, Point, Strip
 
@@ -20,7 +19,7 @@ from planner.types import BoolArray, FloatArray, GridSpec, Point, Strip
 def points_inside(x: FloatArray, y: FloatArray, columns: FloatArray, rows: FloatArray) -> BoolArray:
     """The points inside a simple polygon, those on its boundary left out; shape (rows, columns).
 
-    Along each row the points behind an odd number of crossings are inside. A general library takes far longer, as it
+    Along each row the points behind an odd number of crossings are inside. A general library takes twice as long, as it
     asks of each point by itself.
 
     Args:
@@ -29,39 +28,20 @@ def points_inside(x: FloatArray, y: FloatArray, columns: FloatArray, rows: Float
         columns: the lattice's x, ascending, at least one.
         rows: its y, ascending.
     """
-    return _inside(*map(np.ascontiguousarray, (x, y, columns, rows)))
-
-
-@compiled
-def _inside(x: FloatArray, y: FloatArray, columns: FloatArray, rows: FloatArray) -> BoolArray:
-    """The same of arrays of one layout."""
-    inside = np.zeros((rows.size, columns.size), np.bool_)
-    met = np.empty(x.size, np.int64)  # the columns that lie right on a side
-    for row in range(rows.size):
-        of_row, at, count = inside[row], rows[row], 0
-        for corner in range(x.size):
-            end = (corner + 1) % x.size
-            if (y[corner] <= at) != (y[end] <= at):
-                crossing = x[corner] + (at - y[corner]) * (x[end] - x[corner]) / (y[end] - y[corner])
-                column = np.searchsorted(columns, crossing)
-                if column < columns.size:
-                    of_row[column] = not of_row[column]
-                    if columns[column] == crossing:
-                        met[count], count = column, count + 1
-        for column in range(1, columns.size):
-            of_row[column] ^= of_row[column - 1]
-        of_row[met[:count]] = False
-        # A corner, and a side along a row, that no crossing tells of.
-        for corner in range(x.size):
-            if y[corner] == at:
-                end = (corner + 1) % x.size
-                other = x[end] if y[end] == at else x[corner]
-                first = np.searchsorted(columns, min(x[corner], other))
-                of_row[first : np.searchsorted(columns, max(x[corner], other), side="right")] = False
+    next_x, next_y = np.concatenate([x[1:], x[:1]]), np.concatenate([y[1:], y[:1]])
+    row, side = ((y <= rows[:, np.newaxis]) != (next_y <= rows[:, np.newaxis])).nonzero()
+    crossing = x[side] + (rows[row] - y[side]) * (next_x - x)[side] / (next_y - y)[side]
+    inside = np.zeros((rows.size, columns.size + 1), dtype=np.bool_)
+    np.logical_xor.at(inside, (row, np.searchsorted(columns, crossing)), True)
+    inside = np.logical_xor.accumulate(inside, axis=1)[:, :-1]
+    nearest = np.minimum(np.searchsorted(columns, crossing), columns.size - 1)
+    met = columns[nearest] == crossing
+    inside[row[met], nearest[met]] = False
+    # A corner, and a side along a row, that no crossing tells of.
+    for at, corner in np.argwhere(y == rows[:, np.newaxis]).tolist():
+        ends = sorted((x[corner], next_x[corner] if next_y[corner] == y[corner] else x[corner]))
+        inside[at, (columns >= ends[0]) & (columns <= ends[1])] = False
     return inside
-
-
-_inside.called_with(lambda: tuple(np.zeros((4, 1))))
 
 
 ON_BOUNDARY_M = 1e-6

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import shapely
-from compiling import needs_compiling, times_compiled
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner.region import _inside, points_inside
+from planner.region import points_inside
 
 COLUMNS, ROWS = np.arange(12.0), np.arange(9.0)
 HALVES = st.integers(-4, 26).map(lambda half: half / 2)
@@ -40,10 +39,3 @@ def test_a_rectangle_with_its_sides_on_the_lattice_holds_what_is_between_them() 
 def test_nothing_lies_in_what_is_beside_the_lattice_or_begins_at_its_last_column() -> None:
     assert not points_inside(np.array([20.0, 30, 25]), np.array([1.0, 1, 5]), COLUMNS, ROWS).any()
     assert not points_inside(np.array([11.0, 14, 14, 11]), np.array([1.0, 1, 5, 5]), COLUMNS, ROWS).any()
-
-
-@needs_compiling
-def test_are_found_by_what_is_compiled_for_one_kind_of_corners() -> None:
-    corners = np.array([[2.0, 1], [6, 1], [6, 5], [2, 5]])
-    points_inside(corners[:, 0], corners[::-1, 1], COLUMNS[::2], ROWS[::-1][::-1])
-    assert times_compiled(_inside) == 1
