@@ -3,12 +3,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 import numpy as np
 
-from coordinator.cut.search import Counts, worth_of
+from coordinator.cut.search import Counts, fly_each
 from coordinator.cut.window import Window
 from planner.types import BoolArray, FloatArray
 
@@ -99,6 +99,19 @@ class Ground:
         if self.contacts is not None:
             self.contacts[:, *cells] *= 1.0 - share
 
+    def fly_each(
+        self, windows: Sequence[Window], shares: Sequence[float] | float = 1.0, least_m2: Sequence[float] | float = -1.0
+    ) -> FloatArray:
+        """The same along windows, one after the other, but none that counts no more than its least, and what each of
+        them brings: see `coordinator.cut.search.fly_each`."""
+        bounds = np.array([one.bounds for one in windows], dtype=np.int64).reshape(-1, 4)
+        its_shares = np.full(len(windows), shares, dtype=np.float64)
+        its_least_m2 = np.full(len(windows), least_m2, dtype=np.float64)
+        contacts = np.empty((0, *self.risk.shape)) if self.contacts is None else self.contacts
+        return fly_each(
+            self.risk, self.look, self.weights, self.is_seen, contacts, self.counts, bounds, its_shares, its_least_m2
+        )
+
     def left_m2(self) -> float:
         """What is left of the objective (residual risk times m2): the worst 30 % as they are now, not by the
         threshold."""
@@ -129,18 +142,6 @@ class Ground:
     def counts(self) -> Counts:
         """What a look counts in the objective."""
         return Counts(self.objective.mean, self.objective.worst / WORST, self.threshold)
-
-    def worth(self, window: Window | None = None) -> FloatArray:
-        """What a look at each cell of a window, or of all, counts in the objective (residual risk times m2)."""
-        rows, columns = self.risk.shape
-        place = (0, rows, 0, columns) if window is None else window.bounds
-        contacts = _nothing(self.risk.shape) if self.contacts is None else self.contacts[0]
-        return worth_of(self.risk, self.look, self.weights, contacts, self.counts, place)
-
-
-@lru_cache(maxsize=16)
-def _nothing(shape: tuple[int, int]) -> FloatArray:
-    return np.zeros(shape)
 
 
 def _worst_from(risk: FloatArray) -> float:
