@@ -10,6 +10,7 @@ import numpy as np
 
 from coordinator.cut.search import Counts, fly_each
 from coordinator.cut.window import Window
+from planner.compiled import compiled
 from planner.types import BoolArray, FloatArray
 
 WORST = 0.3  # share of the area
@@ -75,17 +76,13 @@ class Ground:
     def in_blocks(self, block: int) -> Ground:
         """The same by blocks of so many cells a side, of which the last may have fewer: what a look removes of a block,
         flown whole, is what it removes of its cells."""
-        weights = np.where(self.risk > 0, self.weights, 0.0)
-        weights_of, at_risk, removed, seen = (
-            _sums(one, block)
-            for one in (weights, weights * self.risk, weights * self.risk * self.look, weights * self.is_seen)
-        )
+        risk, look, weights, is_seen = _in_blocks(self.risk, self.look, self.weights, self.is_seen, block)
         return replace(
             self,
-            risk=at_risk / np.where(weights_of > 0, weights_of, 1.0),
-            look=removed / np.where(at_risk > 0, at_risk, 1.0),
-            weights=weights_of,
-            is_seen=seen > weights_of / 2,
+            risk=risk,
+            look=look,
+            weights=weights,
+            is_seen=is_seen,
             contacts=None if self.contacts is None else np.stack([_sums(one, block) for one in self.contacts]),
             goal_m2=None if self.goal_m2 is None else _sums(np.where(self.risk > 0, self.goal_m2, 0.0), block),
         )
@@ -151,6 +148,42 @@ def _worst_from(risk: FloatArray) -> float:
     ordered = np.partition(risk, (below, above))
     low, high, share = float(ordered[below]), float(ordered[above]), place - below
     return low + (high - low) * share if share < 0.5 else high - (high - low) * (1 - share)
+
+
+@compiled
+def _in_blocks(
+    risk: FloatArray, look: FloatArray, weights: FloatArray, is_seen: BoolArray, block: int
+) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
+    """See `Ground.in_blocks`. Sums over a block are sums of those over its rows."""
+    (rows, columns), size = risk.shape, (-(-risk.shape[0] // block), -(-risk.shape[1] // block))
+    of_risk, of_look, of_weights = np.zeros(size), np.zeros(size), np.zeros(size)
+    of_seen = np.empty(size, np.bool_)
+    for at in np.ndindex(size):
+        weight = at_risk = removed = seen = 0.0
+        for row in range(at[0] * block, min((at[0] + 1) * block, rows)):
+            its_weight = its_risk = its_removed = its_seen = 0.0
+            for column in range(at[1] * block, min((at[1] + 1) * block, columns)):
+                if risk[row, column] > 0:
+                    counts = weights[row, column]
+                    its_weight += counts
+                    its_risk += counts * risk[row, column]
+                    its_removed += counts * risk[row, column] * look[row, column]
+                    its_seen += counts if is_seen[row, column] else 0.0
+            weight, at_risk, removed, seen = (
+                weight + its_weight,
+                at_risk + its_risk,
+                removed + its_removed,
+                seen + its_seen,
+            )
+        of_weights[at], of_seen[at] = weight, seen > weight / 2
+        if weight > 0:
+            of_risk[at] = at_risk / weight
+        if at_risk > 0:
+            of_look[at] = removed / at_risk
+    return of_risk, of_look, of_weights, of_seen
+
+
+_in_blocks.called_with(lambda: (*np.ones((3, 1, 1)), np.ones((1, 1), dtype=np.bool_), 1))
 
 
 def _sums(values: FloatArray, block: int) -> FloatArray:

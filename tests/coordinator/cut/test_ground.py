@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from looks_worth import worth_of
 
-from coordinator.cut.ground import OBJECTIVES, Ground
+from coordinator.cut.ground import OBJECTIVES, Ground, _sums
 from coordinator.cut.window import Window
 from planner.types import FloatArray
 
@@ -206,6 +206,24 @@ def test_what_a_look_removes_of_a_block_is_what_it_removes_of_its_cells_also_at_
     assert blocks.look == pytest.approx(np.array([[0.16 / 0.26, 0.11 / 0.2], [0.06 / 0.15, 0.0]]))
     assert worth_of(blocks) == pytest.approx(np.array([[0.16, 0.11], [0.06, 0.0]]))
     assert blocks.left_m2() == pytest.approx(one.left_m2())
+
+
+@settings(max_examples=60, deadline=None)
+@given(seed=st.integers(0, 1000), rows=st.integers(1, 13), columns=st.integers(1, 13), block=st.integers(1, 5))
+def test_over_blocks_cells_are_summed_row_by_row(seed: int, rows: int, columns: int, block: int) -> None:
+    rng = np.random.default_rng(seed)
+    risk, look, weights = rng.random((3, rows, columns))
+    risk[rng.random(risk.shape) < 0.3], look[rng.random(risk.shape) < 0.2] = 0.0, 0.0
+    is_seen = rng.random(risk.shape) < 0.5
+    blocks = Ground(risk, look, weights, is_seen, OBJECTIVES["mean"], 0.0).in_blocks(block)
+    counts = np.where(risk > 0, weights, 0.0)
+    weight, at_risk, removed, seen = (
+        _sums(one, block) for one in (counts, counts * risk, counts * risk * look, counts * is_seen)
+    )
+    assert blocks.weights.tolist() == weight.tolist()  # all of them to the last bit
+    assert blocks.risk.tolist() == (at_risk / np.where(weight > 0, weight, 1.0)).tolist()
+    assert blocks.look.tolist() == (removed / np.where(at_risk > 0, at_risk, 1.0)).tolist()
+    assert blocks.is_seen.tolist() == (seen > weight / 2).tolist()
 
 
 def test_blocks_hold_what_there_is_of_them_in_a_map_longer_one_way_than_the_other() -> None:

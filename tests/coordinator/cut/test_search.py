@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from looks_worth import worth_of
 
-from coordinator.cut.ground import OBJECTIVES, Ground
+from coordinator.cut.ground import OBJECTIVES, Ground, _in_blocks
 from coordinator.cut.search import (
     SPARE_STRIPS,
     STEP,
@@ -559,9 +559,10 @@ def test_for_ground_of_all_kinds_the_cutting_is_compiled_once() -> None:
             for its_rules in rules:
                 for across in (False, True):
                     found, _ = Cutting(GRID, told, its_rules, across=across).cut(PRICE, 0.1, 1000.0)
+                    told.in_blocks(2).copy().fly_each([])
                     told.copy().fly_each(found)
                     told.copy().fly_each(found, [0.5] * len(found), 10.0)
-    for one in (windows_for, fly_each, look_anew):
+    for one in (windows_for, fly_each, look_anew, _in_blocks):
         assert times_compiled(one) == 1
 
 
