@@ -12,7 +12,8 @@ import numpy as np
 from coordinator.allocate.beam import Found
 from coordinator.allocate.service import StripTable, StripWays
 from coordinator.allocate.situation import HORIZON_S, Helper, OpenStrip
-from planner.types import FloatArray
+from planner.compiled import compiled
+from planner.types import FloatArray, IntArray
 
 MOST_STRIPS = 32
 """So many strips are planned with, those that bring most for the time they take."""
@@ -43,26 +44,20 @@ class Team:
         self.table, self.way = _empty((len(helpers), self.nodes), count)
         for some in _alike(tables):
             table = tables[some[0]]
-            own = table.sonar_on_s.shape[1]
-            nodes = (places[:, np.newaxis] * ways + np.arange(own)).ravel()
             starts = np.array([helpers[number].free_at for number in some], dtype=np.float64)
             its_s, chosen = table.ways.shortest_from_each([table.leave.reshape(-1, 3), starts])
-            way, sweep_s = places * ways + chosen, table.sonar_on_s[places, chosen]
-            for place, number in enumerate(some, start=nodes.size):
-                its, home_s = self.table[number], tables[number].home_s[places, chosen]
-                for rows, poses in ((nodes, slice(nodes.size)), (self.start, place)):
-                    self.way[number, rows] = way[poses]
-                    its[rows, 0], its[rows, 1], its[rows, 2] = its_s[poses], sweep_s[poses], home_s[poses]
+            for place, number in enumerate(some):
+                one, its = tables[number], (self.table[number], self.way[number])
+                _fill(*its, its_s, chosen, place, table.sonar_on_s, one.home_s, one.worth_m2, ways)
                 if helpers[number].task is None and helpers[number].waits_s:
-                    its[self.start, 0] += helpers[number].wait_s(self.strips)
-                its[:, 3] = tables[number].worth_m2
+                    self.table[number, self.start, 0] += helpers[number].wait_s(self.strips)
         self.run_out_s = np.array([one.run_in_m / one.speed_mps for one in helpers], dtype=np.float64)
         self.lasts_s = np.array([one.lasts_until_s for one in helpers], dtype=np.float64)
         self.until_s = np.minimum(self.lasts_s, deadline_s)
         self.deadline_s = float(deadline_s)
         self.alone_m2 = self.table[:, self.start, 3].max(axis=0)
         sweeps_s = np.array([one.sonar_on_s.min(axis=1) for one in tables]).min(axis=0)
-        self.alone_s = sweeps_s + self._usual_way_s(self.table[:, :, 0])
+        self.alone_s = sweeps_s + self._usual_way_s()
         self._takes_s = float(self.alone_s[self.alone_m2 > 0].sum()) * len(strips) / count
         rates = self.alone_m2 / self.alone_s
         self.later_m2ps = LATER_SHARE * float(rates.min())
@@ -114,12 +109,9 @@ class Team:
             left_s.append(max(0.0, float(self.until_s[one]) - now_s))
         return total_m2, left_s, shares
 
-    def _usual_way_s(self, to_begin_s: FloatArray) -> float:
-        """The way to the strip that is nearest, as it mostly is; by the time from each helper's nodes to strips."""
-        nearest_s = to_begin_s[:, : self.start].min(axis=0)
-        nodes = np.arange(self.start)
-        nearest_s[nodes, nodes // (self.start // len(self.strips))] = np.inf
-        least_s = np.append(nearest_s.min(axis=1), to_begin_s[:, self.start].min())
+    def _usual_way_s(self) -> float:
+        """The way to the strip that is nearest, as it mostly is."""
+        least_s = _nearest_s(self.table)
         finite_s = least_s[np.isfinite(least_s)].tolist()
         return median(finite_s) if finite_s else math.nan
 
@@ -129,6 +121,58 @@ def _empty(nodes: tuple[int, ...], strips: int) -> tuple[FloatArray, np.ndarray]
     table = np.zeros((*nodes, 4, strips))
     table[..., 0, :], table[..., 1, :] = np.inf, 1.0
     return table, np.zeros((*nodes, strips), dtype=np.intp)
+
+
+@compiled
+def _fill(
+    table: FloatArray,
+    way: IntArray,
+    to_begin_s: FloatArray,
+    chosen: IntArray,
+    helper: int,
+    sonar_on_s: FloatArray,
+    home_s: FloatArray,
+    worth_m2: FloatArray,
+    ways: int,
+) -> None:
+    """Fills a helper's part of `Team.table` and `Team.way`, of strips that are flown in so many `ways` at most.
+    `to_begin_s`, `chosen`, shape (poses, strips): see `StripWays.shortest_from`, from behind each strip, flown each of
+    its ways, and from each start, of which `helper` is the how manieth; the others: see `StripTable`."""
+    strips, own = sonar_on_s.shape
+    for place in range(strips * own + 1):
+        is_start = place == strips * own
+        pose, node = (place + helper, strips * ways) if is_start else (place, place // own * ways + place % own)
+        for strip in range(strips):
+            its_way = chosen[pose, strip]
+            way[node, strip] = strip * ways + its_way
+            table[node, 0, strip] = to_begin_s[pose, strip]
+            table[node, 1, strip] = sonar_on_s[strip, its_way]
+            table[node, 2, strip] = home_s[strip, its_way]
+    table[:, 3] = worth_m2
+
+
+@compiled
+def _nearest_s(table: FloatArray) -> FloatArray:
+    """How long it is from behind each strip, flown each way, to the nearest other one, and from the starts; of all
+    helpers the least. `table`: see `Team`."""
+    helpers, nodes, _, strips = table.shape
+    ways, nearest_s = (nodes - 1) // strips, np.full(nodes, np.inf)
+    for helper in range(helpers):
+        for node in range(nodes):
+            for strip in range(strips):
+                if strip != node // ways:
+                    nearest_s[node] = min(nearest_s[node], table[helper, node, 0, strip])
+    return nearest_s
+
+
+_fill.called_with(
+    lambda: (
+        *(np.ones((3, 4, 1)), np.zeros((3, 1), dtype=np.int64)),
+        *(np.ones((3, 1)), np.zeros((3, 1), dtype=np.int64), 0),
+        *(np.ones((1, 2)), np.ones((1, 2)), np.ones(1), 2),
+    )
+)
+_nearest_s.called_with(lambda: (np.ones((1, 3, 4, 1)),))
 
 
 def _alike(tables: Sequence[StripTable]) -> list[list[int]]:

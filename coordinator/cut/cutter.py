@@ -16,9 +16,6 @@ from coordinator.cut.strips import Counted, Cut, Cutting, CuttingRules, cells_wi
 from coordinator.cut.window import Window
 from planner.types import GridSpec
 
-SPARE_STRIPS = 4  # so many more than helpers have time for, so that there is a choice to the end
-STEP = 1.2  # by which the price is changed until they are so many
-MOST_STEPS = 48  # more than from the least price to the highest there is
 STAYS_FOR = 0.005  # share of what strips remove by which those cut anew must be better than those that are open
 TURNS_FOR = 0.02  # and by which those of the other heading must, as what is expected changes from one cut to the next
 BLOCKS_A_SWATH = 5  # cells are taken together in blocks, of which at least so many make a swath
@@ -131,26 +128,19 @@ class Cutter:
             for choice in differ
         ]
         for choice, shares in zip(differ, flown(in_cells), strict=True):
-            after, least_m2 = ground.copy(), 0.0
-            for place, share in shares.items():
-                window = choice[place].window
-                after.fly(window, share)
+            after, windows, least_m2 = ground.copy(), [choice[place].window for place in shares], 0.0
+            after.fly_each(windows, list(shares.values()))
+            for window, share in zip(windows, shares.values(), strict=True):
                 least_m2 += share * self._kept.least_m2(window)
             leaves[choice] = after, after.left_m2() + least_m2
         return leaves
 
     def _cuts(self, ground: Ground, windows: Sequence[Window]) -> list[Cut]:
         """What windows of cells bring if they are flown one after the other."""
-        left, found = ground.copy(), list[Cut]()
-        for window in windows:
-            cells = window.cells
-            worth = left.worth(window)
-            counts_m2 = float(worth.sum())
-            removed_m2 = float((left.risk[cells] * left.look[cells]).sum()) * self._cell_area_m2
-            foreseen = float(worth[left.is_seen[cells]].sum()) < counts_m2 / 2
-            found.append(Cut(window, counts_m2, removed_m2, foreseen))
-            left.fly(window)
-        return found
+        return [
+            Cut(window, counts_m2, removed * self._cell_area_m2, foreseen=seen_m2 < counts_m2 / 2)
+            for window, (counts_m2, seen_m2, removed) in zip(windows, ground.fly_each(windows).tolist(), strict=True)
+        ]
 
 
 def _counted(
@@ -158,13 +148,10 @@ def _counted(
 ) -> tuple[Counted, ...]:
     """What windows count if they are flown one after the other; one that counts no more than `least_m2` says is left
     out, and not flown."""
-    left, found = ground.copy(), list[Counted]()
-    for window in windows:
-        counts_m2 = float(left.worth(window).sum())
-        if least_m2 is None or counts_m2 > least_m2(window):
-            found.append(Counted(window, counts_m2))
-            left.fly(window)
-    return tuple(found)
+    least = [-1.0 if least_m2 is None else least_m2(one) for one in windows]
+    told = ground.copy().fly_each(windows, 1.0, least)[:, 0].tolist()
+    each = zip(windows, told, least, strict=True)
+    return tuple(Counted(window, counts_m2) for window, counts_m2, its_least_m2 in each if counts_m2 > its_least_m2)
 
 
 class OneHeading:
@@ -182,41 +169,13 @@ class OneHeading:
         spare; none without time."""
         if time_m <= 0:
             return []
-        fresh = Cutting(self._grid, ground, self._rules, across=self._across)
-        left, found = self._cut(fresh, self.price)
-        for _ in range(MOST_STEPS):
-            if self.metres(found) < time_m:
-                if self.price <= self._least_price:
-                    break
-                self.price = max(self._least_price, self.price / STEP)
-                left, found = self._cut(fresh, self.price)
-            else:
-                left_dearer, dearer = self._cut(fresh, self.price * STEP)
-                if self.metres(dearer) < time_m:
-                    break
-                self.price, left, found = self.price * STEP, left_dearer, dearer
-        price = self.price
-        while self.metres(found) < self._enough_m(time_m, found) and price > self._least_price:
-            price = max(self._least_price, price / STEP**2)
-            found = [*found, *left.cut(price)]
+        cutting = Cutting(self._grid, ground, self._rules, across=self._across)
+        found, self.price = cutting.cut(self.price, self._least_price, time_m)
         return found
-
-    @staticmethod
-    def _cut(fresh: Cutting, price: float) -> tuple[Cutting, list[Window]]:
-        """What is cut of ground at a price, and the ground as that leaves it."""
-        left = fresh.copy()
-        return left, left.cut(price)
 
     def least_m2(self, window: Window) -> float:
         """What a strip there has to count to be worth flying whatever time there is."""
-        return self._least_price * self.metres([window])
-
-    def _enough_m(self, time_m: float, found: Sequence[Window]) -> float:
-        return time_m + SPARE_STRIPS * self.metres(found) / max(1, len(found))
-
-    def metres(self, windows: Sequence[Window]) -> float:
-        """What is flown for some windows, the ways to them included."""
-        return sum(self._rules.metres_flown(one.cells_long * self._grid.cell_m) for one in windows)
+        return self._least_price * self._rules.metres_flown(window.cells_long * self._grid.cell_m)
 
 
 def _block(width: int) -> int:

@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 import numpy as np
 
-from coordinator.cut.search import Counts, worth_of
+from coordinator.cut.search import Counts, fly_each
 from coordinator.cut.window import Window
+from planner.compiled import compiled
 from planner.types import BoolArray, FloatArray
 
 WORST = 0.3  # share of the area
@@ -75,17 +76,13 @@ class Ground:
     def in_blocks(self, block: int) -> Ground:
         """The same by blocks of so many cells a side, of which the last may have fewer: what a look removes of a block,
         flown whole, is what it removes of its cells."""
-        weights = np.where(self.risk > 0, self.weights, 0.0)
-        weights_of, at_risk, removed, seen = (
-            _sums(one, block)
-            for one in (weights, weights * self.risk, weights * self.risk * self.look, weights * self.is_seen)
-        )
+        risk, look, weights, is_seen = _in_blocks(self.risk, self.look, self.weights, self.is_seen, block)
         return replace(
             self,
-            risk=at_risk / np.where(weights_of > 0, weights_of, 1.0),
-            look=removed / np.where(at_risk > 0, at_risk, 1.0),
-            weights=weights_of,
-            is_seen=seen > weights_of / 2,
+            risk=risk,
+            look=look,
+            weights=weights,
+            is_seen=is_seen,
             contacts=None if self.contacts is None else np.stack([_sums(one, block) for one in self.contacts]),
             goal_m2=None if self.goal_m2 is None else _sums(np.where(self.risk > 0, self.goal_m2, 0.0), block),
         )
@@ -98,6 +95,19 @@ class Ground:
         risk *= 1.0 - (self.look[cells] if share == 1.0 else share * self.look[cells])
         if self.contacts is not None:
             self.contacts[:, *cells] *= 1.0 - share
+
+    def fly_each(
+        self, windows: Sequence[Window], shares: Sequence[float] | float = 1.0, least_m2: Sequence[float] | float = -1.0
+    ) -> FloatArray:
+        """The same along windows, one after the other, but none that counts no more than its least, and what each of
+        them brings: see `coordinator.cut.search.fly_each`."""
+        bounds = np.array([one.bounds for one in windows], dtype=np.int64).reshape(-1, 4)
+        its_shares = np.full(len(windows), shares, dtype=np.float64)
+        its_least_m2 = np.full(len(windows), least_m2, dtype=np.float64)
+        contacts = np.empty((0, *self.risk.shape)) if self.contacts is None else self.contacts
+        return fly_each(
+            self.risk, self.look, self.weights, self.is_seen, contacts, self.counts, bounds, its_shares, its_least_m2
+        )
 
     def left_m2(self) -> float:
         """What is left of the objective (residual risk times m2): the worst 30 % as they are now, not by the
@@ -130,18 +140,6 @@ class Ground:
         """What a look counts in the objective."""
         return Counts(self.objective.mean, self.objective.worst / WORST, self.threshold)
 
-    def worth(self, window: Window | None = None) -> FloatArray:
-        """What a look at each cell of a window, or of all, counts in the objective (residual risk times m2)."""
-        rows, columns = self.risk.shape
-        place = (0, rows, 0, columns) if window is None else window.bounds
-        contacts = _nothing(self.risk.shape) if self.contacts is None else self.contacts[0]
-        return worth_of(self.risk, self.look, self.weights, contacts, self.counts, place)
-
-
-@lru_cache(maxsize=16)
-def _nothing(shape: tuple[int, int]) -> FloatArray:
-    return np.zeros(shape)
-
 
 def _worst_from(risk: FloatArray) -> float:
     """From which on these are of the worst, at least one: `numpy.quantile` tells the same, with more ado."""
@@ -150,6 +148,42 @@ def _worst_from(risk: FloatArray) -> float:
     ordered = np.partition(risk, (below, above))
     low, high, share = float(ordered[below]), float(ordered[above]), place - below
     return low + (high - low) * share if share < 0.5 else high - (high - low) * (1 - share)
+
+
+@compiled
+def _in_blocks(
+    risk: FloatArray, look: FloatArray, weights: FloatArray, is_seen: BoolArray, block: int
+) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
+    """See `Ground.in_blocks`. Sums over a block are sums of those over its rows."""
+    (rows, columns), size = risk.shape, (-(-risk.shape[0] // block), -(-risk.shape[1] // block))
+    of_risk, of_look, of_weights = np.zeros(size), np.zeros(size), np.zeros(size)
+    of_seen = np.empty(size, np.bool_)
+    for at in np.ndindex(size):
+        weight = at_risk = removed = seen = 0.0
+        for row in range(at[0] * block, min((at[0] + 1) * block, rows)):
+            its_weight = its_risk = its_removed = its_seen = 0.0
+            for column in range(at[1] * block, min((at[1] + 1) * block, columns)):
+                if risk[row, column] > 0:
+                    counts = weights[row, column]
+                    its_weight += counts
+                    its_risk += counts * risk[row, column]
+                    its_removed += counts * risk[row, column] * look[row, column]
+                    its_seen += counts if is_seen[row, column] else 0.0
+            weight, at_risk, removed, seen = (
+                weight + its_weight,
+                at_risk + its_risk,
+                removed + its_removed,
+                seen + its_seen,
+            )
+        of_weights[at], of_seen[at] = weight, seen > weight / 2
+        if weight > 0:
+            of_risk[at] = at_risk / weight
+        if at_risk > 0:
+            of_look[at] = removed / at_risk
+    return of_risk, of_look, of_weights, of_seen
+
+
+_in_blocks.called_with(lambda: (*np.ones((3, 1, 1)), np.ones((1, 1), dtype=np.bool_), 1))
 
 
 def _sums(values: FloatArray, block: int) -> FloatArray:

@@ -8,17 +8,20 @@ if they had been flown, and the search goes on with what is left.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from planner.compiled import compiled
 from planner.types import BoolArray, FloatArray, IntArray
 
-Bounds = tuple[int, int, int, int]
-"""First row, the one behind the last, first column, the one behind the last."""
 MOST_PASSES = 6  # of the search, each over what those before have left
+SPARE_STRIPS = 4  # so many more than helpers have time for, so that there is a choice to the end
+STEP = 1.2  # by which the price is changed until they are so many
+MOST_STEPS = 48  # more than from the least price to the highest there is
 TOLERANCE = 1e-9  # relative: sums that differ by no more count as equal
+MOST_SUMMED, LANES = 128, 8  # numpy sums so many at once, in so many sums side by side
+ADD = -1
 
 
 class Counts(NamedTuple):
@@ -31,8 +34,8 @@ class Counts(NamedTuple):
 
 
 class Costs(NamedTuple):
-    """What each row of a band costs, and each band; and the `shortest` and the `longest` strip into which one is cut,
-    in rows."""
+    """What each row of a band costs, and each band, at some price of a metre flown: at a price of 1 how many metres
+    that is; and the `shortest` and the `longest` strip into which one is cut, in rows."""
 
     row: float
     band: float
@@ -62,17 +65,142 @@ class Left(NamedTuple):
 
 
 @compiled
-def worth_of(
-    risk: FloatArray, look: FloatArray, weights: FloatArray, contacts: FloatArray, counts: Counts, window: Bounds
+def windows_for(
+    ground: Left, counts: Counts, metres: Costs, price: float, least_price: float, time_m: float
+) -> tuple[IntArray, float]:
+    """As many windows as there is time for, at the highest price at which they are, and behind them some to spare, as
+    `cut` tells them; and that price. `metres`: what they cost at a price of 1. `price`: of them last time."""
+    left, found = _cut_anew(ground, counts, metres, price)
+    for _ in range(MOST_STEPS):
+        if _flown_m(found, metres) < time_m:
+            if price <= least_price:
+                break
+            price = max(least_price, price / STEP)
+            left, found = _cut_anew(ground, counts, metres, price)
+        else:
+            left_dearer, dearer = _cut_anew(ground, counts, metres, price * STEP)
+            if _flown_m(dearer, metres) < time_m:
+                break
+            price, left, found = price * STEP, left_dearer, dearer
+    spare_price = price
+    while spare_price > least_price:
+        flown_m = _flown_m(found, metres)
+        if flown_m >= time_m + SPARE_STRIPS * flown_m / max(1, len(found)):
+            break
+        spare_price = max(least_price, spare_price / (STEP * STEP))
+        left.is_known[:] = False  # another price makes other bands the best
+        found = np.concatenate((found, cut(left, counts, _at(spare_price, metres))))
+    return found, price
+
+
+@compiled
+def _cut_anew(ground: Left, counts: Counts, metres: Costs, price: float) -> tuple[Left, IntArray]:
+    """What is cut of ground at a price, and the ground as that leaves it."""
+    left = Left(
+        ground.risk.copy(),
+        ground.look,
+        ground.weights,
+        ground.contacts.copy(),
+        ground.worth.copy(),
+        ground.sums.copy(),
+        ground.first_row.copy(),
+        ground.end_row.copy(),
+        ground.value.copy(),
+        ground.is_known.copy(),
+    )
+    return left, cut(left, counts, _at(price, metres))
+
+
+@compiled
+def _at(price: float, metres: Costs) -> Costs:
+    return Costs(price * metres.row, price * metres.band, metres.shortest, metres.longest)
+
+
+@compiled
+def _flown_m(windows: IntArray, metres: Costs) -> float:
+    """What is flown for some windows, the ways to them included."""
+    flown_m = 0.0
+    for window in range(len(windows)):
+        flown_m += (windows[window, 1] - windows[window, 0]) * metres.row + metres.band
+    return flown_m
+
+
+@compiled
+def fly_each(
+    risk: FloatArray,
+    look: FloatArray,
+    weights: FloatArray,
+    is_seen: BoolArray,
+    contacts: FloatArray,
+    counts: Counts,
+    windows: IntArray,
+    shares: FloatArray,
+    least_m2: FloatArray,
 ) -> FloatArray:
-    """What a look at each cell of a window counts."""
-    first_row, end_row, first_column, end_column = window
-    worth = np.empty((end_row - first_row, end_column - first_column))
-    for row in range(worth.shape[0]):
-        for column in range(worth.shape[1]):
-            at = first_row + row, first_column + column
-            worth[row, column] = _worth(risk[at], look[at], weights[at], contacts[at], counts)
-    return worth
+    """Flies windows, shape (n, 4), one after the other, each as far as its share says, but none that counts no more
+    than its least. The others: see `Ground`; `contacts` of shape (0, rows, columns) where they count for nothing.
+
+    Returns:
+        Shape (n, 3), of each window, as those before leave it: what a look counts, how much of that is of cells that
+        are seen, and the risk that it removes, times cells.
+    """
+    told = np.empty((len(windows), 3))
+    for place in range(len(windows)):
+        first_row, end_row, first_column, end_column = windows[place]
+        size = (end_row - first_row) * (end_column - first_column)
+        worth, removed, seen, cells, cells_seen = np.empty(size), np.empty(size), np.empty(size), 0, 0
+        for row in range(first_row, end_row):
+            for column in range(first_column, end_column):
+                at = row, column
+                contact = contacts[0, row, column] if len(contacts) else 0.0
+                worth[cells] = _worth(risk[at], look[at], weights[at], contact, counts)
+                removed[cells] = risk[at] * look[at]
+                if is_seen[at]:
+                    seen[cells_seen] = worth[cells]
+                    cells_seen += 1
+                cells += 1
+        told[place] = _sum(worth, cells), _sum(seen, cells_seen), _sum(removed, cells)
+        if told[place, 0] > least_m2[place]:
+            for row in range(first_row, end_row):
+                for column in range(first_column, end_column):
+                    risk[row, column] *= 1.0 - shares[place] * look[row, column]
+                    for way in range(len(contacts)):
+                        contacts[way, row, column] *= 1.0 - shares[place]
+    return told
+
+
+@compiled
+def _sum(values: FloatArray, count: int) -> float:
+    """The sum of the first so many as `numpy.sum` tells it, to the last bit: it halves them while they are many, and
+    adds up what it finds of each half. `steps`: how many to sum, or ADD where two sums are to be; the next last."""
+    steps, sums, first = [count], [0.0], 0
+    while steps:
+        size = steps.pop()
+        if size > MOST_SUMMED:
+            half = size // 2 - size // 2 % LANES
+            steps += [ADD, size - half, half]
+        elif size == ADD:
+            last = sums.pop()
+            sums[-1] += last
+        else:
+            sums.append(_sum_of_few(values, first, first + size))
+            first += size
+    return sums[-1]
+
+
+@compiled
+def _sum_of_few(values: FloatArray, first: int, end: int) -> float:
+    """In so many lanes side by side, and what is left behind them."""
+    total, rest = 0.0, end - (end - first) % LANES
+    if first < rest:
+        lanes = values[first : first + LANES].copy()
+        for place in range(first + LANES, rest, LANES):
+            for lane in range(LANES):
+                lanes[lane] += values[place + lane]
+        total = ((lanes[0] + lanes[1]) + (lanes[2] + lanes[3])) + ((lanes[4] + lanes[5]) + (lanes[6] + lanes[7]))
+    for place in range(rest, end):
+        total += values[place]
+    return total
 
 
 @compiled
@@ -124,10 +252,16 @@ def _left() -> Left:
     return Left(risk, look, weights, contacts, worth, sums, first_row, end_row, np.zeros(1), is_known)
 
 
+def _flight() -> tuple[Any, ...]:
+    of_cells, of_window = np.ones((1, 1)), np.ones(1)
+    window, is_seen = np.array([[0, 1, 0, 1]], dtype=np.int64), np.ones((1, 1), dtype=np.bool_)
+    return of_cells, of_cells, of_cells, is_seen, np.ones((2, 1, 1)), _COUNTS, window, of_window, of_window
+
+
 _COUNTS = Counts(1.0, 1.0, 1.0)
-worth_of.called_with(lambda: (*np.ones((4, 1, 1)), _COUNTS, (0, 1, 0, 1)))
 look_anew.called_with(lambda: (_left(), _COUNTS, 0, 1, 0, 1))
-cut.called_with(lambda: (_left(), _COUNTS, Costs(1.0, 1.0, 1, 1)))
+windows_for.called_with(lambda: (_left(), _COUNTS, Costs(1.0, 1.0, 1, 1), 1.0, 1.0, 1.0))
+fly_each.called_with(_flight)
 
 
 @compiled

@@ -3,14 +3,13 @@ the most, at a price for each metre."""
 
 from __future__ import annotations
 
-import copy
 import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from coordinator.cut.ground import Ground
-from coordinator.cut.search import TOLERANCE, Costs, Left, cut, look_anew
+from coordinator.cut.search import TOLERANCE, Costs, Left, look_anew, windows_for
 from coordinator.cut.window import Window
 from planner.types import GridSpec, Strip
 
@@ -52,15 +51,11 @@ class Cut(Counted):
     why: str = ""
 
 
-CHANGE = ("risk", "contacts", "worth", "sums", "first_row", "end_row", "value", "is_known")
-"""What of `Left` is another after a cut."""
-
-
 class Cutting:
-    """Ground as windows are cut of it and flown, all along the tracks, or all across them."""
+    """Ground as windows are to be cut of it, all along the tracks, or all across them."""
 
     def __init__(self, grid: GridSpec, ground: Ground, rules: CuttingRules, *, across: bool = False) -> None:
-        self._cell_m, self._rules, self._across = grid.cell_m, rules, across
+        self._across = across
         self._counts = ground.counts
         lies = ground.turned if across else ground
         rows, columns = lies.risk.shape
@@ -78,24 +73,17 @@ class Cutting:
             is_known=np.zeros(windows, dtype=np.bool_),
         )
         look_anew(self._left, self._counts, 0, rows, 0, columns)
+        shortest = max(1, round(rules.min_strip_m / grid.cell_m))
+        longest = max(shortest, round(rules.max_strip_m / grid.cell_m))
+        self._metres = Costs(float(grid.cell_m), float(rules.overhead_m), shortest, longest)
 
-    def _costs(self, price: float) -> Costs:
-        shortest = max(1, round(self._rules.min_strip_m / self._cell_m))
-        longest = max(shortest, round(self._rules.max_strip_m / self._cell_m))
-        return Costs(price * self._cell_m, price * self._rules.overhead_m, shortest, longest)
-
-    def copy(self) -> Cutting:
-        """One that may be cut by itself."""
-        new, left = copy.copy(self), self._left
-        new._left = left._replace(**{name: getattr(left, name).copy() for name in CHANGE})
-        return new
-
-    def cut(self, price: float) -> list[Window]:
-        """Cuts the windows worth flying at a price for each metre flown, those first that lie side by side; one that
-        lies on another is worth a look when that has been flown. The ground is left as they leave it."""
-        self._left.is_known[:] = False
-        found = [Window(*each) for each in cut(self._left, self._counts, self._costs(price)).tolist()]
-        return [one.turned for one in found] if self._across else found
+    def cut(self, price: float, least_price: float, time_m: float) -> tuple[list[Window], float]:
+        """As many windows as there is time for and some to spare, those first that lie side by side; one that lies on
+        another is worth a look when that has been flown. With the price of a metre at which they are so many, see
+        `windows_for`."""
+        found, price = windows_for(self._left, self._counts, self._metres, price, least_price, float(time_m))
+        windows = [Window(*each) for each in found.tolist()]
+        return ([one.turned for one in windows] if self._across else windows), price
 
 
 def strip_of(grid: GridSpec, window: Window, number: int) -> Strip:

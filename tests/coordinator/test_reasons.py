@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from by_hand import PRIMARY, SECOND_HELPER, vehicle
+from compiling import needs_compiling, times_compiled
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -14,7 +13,7 @@ from comms.said.announcement import Role
 from comms.said.messages import Plan, PlannedTrack
 from coordinator.cut.strips import Cut
 from coordinator.cut.window import Window
-from coordinator.reasons import Reasons, _apart, _best_m, _evenly, _listed, _named
+from coordinator.reasons import Reasons, _apart, _best_m, _evenly, _listed, _named, judged
 from coordinator.vehicles import KnownVehicle
 from planner.types import DetectionCurve, GridSpec, SweepFrame
 from secondlook.testing.checks.any_mail import any_message
@@ -146,19 +145,51 @@ def test_between_which_ranges_it_sees_best(p_detect: tuple[float, ...], best_m: 
 
 def test_places_are_apart_from_a_track_and_beyond_its_ends() -> None:
     # From (10, 20) 50 m up a slope of 3 to 4; beside it, before it, and behind it aside.
-    slope = PlannedTrack(1, 0, 10, 20, 40, 60, False)
-    x_m, y_m = np.array([25 + 8.0, 10 - 6.0, 40 + 3.0 - 8.0]), np.array([40 - 6.0, 20 - 8.0, 60 + 4.0 + 6.0])
-    apart_m, is_beyond = _apart(x_m, y_m, [slope, replace(slope, start_x_m=0.0, end_x_m=30.0)])
-    assert apart_m[0] == pytest.approx([10, 10, np.hypot(5, 10)])
-    assert is_beyond[0].tolist() == [False, True, True]
-    assert apart_m.shape == is_beyond.shape == (2, 3)
-    short_m, _ = _apart(np.array([4.0]), np.array([7.25]), [PlannedTrack(2, 0, 7, 7, 7, 7.5, False)])
-    assert short_m == pytest.approx(np.array([[3.0]]))
+    slope = np.array([10.0, 20.0, 40.0, 60.0])
+    places = (25 + 8.0, 40 - 6.0), (10 - 6.0, 20 - 8.0), (40 + 3.0 - 8.0, 60 + 4.0 + 6.0)
+    assert np.array([_apart(x_m, y_m, slope) for x_m, y_m in places]) == pytest.approx(
+        np.array([(10, 0), (10, 10), (np.hypot(5, 10), 5)])
+    )
+    assert _apart(4.0, 7.25, np.array([7.0, 7.0, 7.0, 7.5])) == pytest.approx((3.0, 0.0))
 
 
 def test_a_place_half_a_metre_behind_a_track_is_beyond_it() -> None:
-    _, is_beyond = _apart(np.array([3.0, 3.0]), np.array([10.0, 10.5]), [PlannedTrack(1, 0, 3, 4, 3, 10, False)])
-    assert is_beyond.tolist() == [[False, True]]
+    track = np.array([3.0, 4.0, 3.0, 10.0])
+    assert [_apart(3.0, y_m, track) for y_m in (10.0, 10.5)] == [(0.0, 0.0), (0.5, 0.5)]
+
+
+@given(
+    window=st.tuples(st.integers(0, 40), st.integers(1, 40), st.integers(0, 40), st.integers(1, 40)),
+    heading_rad=st.floats(0.0, 6.28),
+    seed=st.integers(0, 100),
+    tracks=st.integers(1, 5),
+)
+def test_cells_are_judged_as_many_at_once_would_be(
+    window: tuple[int, int, int, int], heading_rad: float, seed: int, tracks: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    grid = GridSpec(SweepFrame(-70.0, 300.0, heading_rad), 5.0, 81, 80)
+    risk, ends, best_m = rng.random(grid.shape), rng.uniform(-300, 500, (tracks, 4)), rng.uniform(0, 90, (tracks, 2))
+    place = Window(window[0], window[0] + window[1], window[2], window[2] + window[3])
+    places = Reasons(grid, {}, risk)._places
+    nearest, causes, weights = judged(places, place.bounds, ends, best_m)
+
+    rows, columns = _evenly(place.first_row, place.end_row), _evenly(place.first_column, place.end_column)
+    across_m, along_m = grid.across_m[columns][np.newaxis, :], grid.along_m[rows][:, np.newaxis]
+    x_m, y_m = (one.ravel() for one in grid.frame.to_mission(across_m, along_m))
+    start_x, start_y, end_x, end_y = ends.T[:, :, np.newaxis]
+    length = np.hypot(end_x - start_x, end_y - start_y)
+    east, north = (end_x - start_x) / length, (end_y - start_y) / length
+    along = (x_m - start_x) * east + (y_m - start_y) * north
+    across = (x_m - start_x) * north - (y_m - start_y) * east
+    over = np.maximum(np.maximum(-along, along - length), 0.0)
+    apart_m = np.hypot(across, over)
+    assert nearest.tolist() == apart_m.argmin(axis=0).tolist()
+    cells = np.arange(nearest.size)
+    apart_m, is_beyond, (near_m, far_m) = apart_m[nearest, cells], over[nearest, cells] > 0, best_m[nearest].T
+    holds = np.array([is_beyond, apart_m <= near_m, apart_m >= far_m, np.ones_like(is_beyond)])
+    assert causes.tolist() == holds.argmax(axis=0).tolist()
+    assert weights.tolist() == risk[np.ix_(rows, columns)].ravel().tolist()
 
 
 def test_what_weighs_most_is_named_however_little_that_is() -> None:
@@ -166,11 +197,11 @@ def test_what_weighs_most_is_named_however_little_that_is() -> None:
 
 
 def test_at_most_twelve_cells_to_a_side_are_looked_at_evenly_with_both_ends() -> None:
-    assert _evenly(5, 9) == [5, 6, 7, 8]
-    assert _evenly(3, 4) == [3]
-    assert _evenly(10, 22) == list(range(10, 22))
-    assert _evenly(10, 33) == list(range(10, 33, 2))
-    assert _evenly(0, 112) == [0, 10, 20, 30, 40, 50, 61, 71, 81, 91, 101, 111]
+    assert _evenly(5, 9).tolist() == [5, 6, 7, 8]
+    assert _evenly(3, 4).tolist() == [3]
+    assert _evenly(10, 22).tolist() == list(range(10, 22))
+    assert _evenly(10, 33).tolist() == list(range(10, 33, 2))
+    assert _evenly(0, 112).tolist() == [0, 10, 20, 30, 40, 50, 61, 71, 81, 91, 101, 111]
 
 
 def test_words_are_listed_with_an_and_before_the_last() -> None:
@@ -193,3 +224,9 @@ def test_of_several_primaries_each_sees_as_its_own_curve_tells_and_tracks_are_to
         why(lane(170, 180), one, other, risk=half)
         == f"expected beside a-second's track 2 and {PRIMARY}'s track 1: range's end"
     )
+
+
+@needs_compiling
+def test_for_places_of_all_kinds_judging_is_compiled_once() -> None:
+    why(lane(90, 110), primary(100, 250), risk=np.zeros(GRID.shape))
+    assert times_compiled(judged) == 1

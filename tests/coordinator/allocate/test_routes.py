@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import compress, permutations, product
+from statistics import median
 
 import numpy as np
 import pytest
@@ -180,6 +181,33 @@ class TestWhatIsPromising:
         # Alpha flies one leg, 100 s of it, beta two. Between the strips it is 290 m and a run-in of 5 m, at 2 m/s.
         team = Team([NEAR, FAR], [helper(), helper("beta", swath_m=30)], 3600)
         assert team.alone_s == pytest.approx([100 + 147.5] * 2)
+
+    @settings(max_examples=60, deadline=None)
+    @given(told=situations().filter(lambda one: one.strips and one.helpers))
+    def test_of_each_helper_it_is_known_what_it_finds_from_its_start_and_from_behind_each_strip(
+        self, told: Situation
+    ) -> None:
+        team = Team(told.strips, told.helpers, 3600)
+        tables = [StripTable(told.strips, one) for one in told.helpers]
+        count, ways = len(told.strips), max(one.sonar_on_s.shape[1] for one in tables)
+        nearest_s = [[math.inf] for _ in range(count * ways + 1)]
+        for number, (one, its) in enumerate(zip(told.helpers, tables, strict=True)):
+            own = its.sonar_on_s.shape[1]
+            poses = {count * ways: Pose(*one.free_at)}
+            poses |= {job * ways + way: Pose(*its.leave[job, way]) for job in range(count) for way in range(own)}
+            assert np.isinf(np.delete(team.table[number, :, 0], list(poses), axis=0)).all()
+            assert (team.table[number, :, 3] == its.worth_m2).all()
+            for node, pose in poses.items():
+                (begins_s,), (chosen,) = its.ways.shortest_from(np.array([pose]))
+                assert team.table[number, node, 0].tolist() == begins_s.tolist()
+                assert team.way[number, node].tolist() == [job * ways + way for job, way in enumerate(chosen.tolist())]
+                places = np.arange(count), chosen
+                assert team.table[number, node, 1].tolist() == its.sonar_on_s[places].tolist()
+                assert team.table[number, node, 2].tolist() == its.home_s[places].tolist()
+                nearest_s[node] += np.delete(begins_s, [node // ways] if node < count * ways else []).tolist()
+        usual_s = median([least_s for least_s in map(min, nearest_s) if least_s < math.inf])
+        sweeps_s = np.min([one.sonar_on_s.min(axis=1) for one in tables], axis=0)
+        assert team.alone_s.tolist() == (sweeps_s + usual_s).tolist()
 
     def test_a_sweep_takes_what_it_does_the_way_in_which_it_is_soonest_over(self) -> None:
         # In a current of 0.5 m/s from astern 80 s, against it 133 s; the way there 100 m at 2.5 m/s.

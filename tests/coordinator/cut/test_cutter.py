@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from looks_worth import worth_of
 
 from coordinator.cut import cutter
 from coordinator.cut.cutter import Cutter, Flown
@@ -382,7 +383,7 @@ def test_each_tells_what_those_before_it_and_those_that_are_claimed_leave(
     for number in claimed:
         left.fly(lane(number))
     for one in cuts:
-        assert one.counts_m2 == pytest.approx(left.worth()[one.window.cells].sum())
+        assert one.counts_m2 == pytest.approx(worth_of(left)[one.window.cells].sum())
         assert one.removable_m2 == pytest.approx(left.risk[one.window.cells].sum() * LOOK * 25)
         assert one.counts_m2 > LEAST / 25 * 50 * (one.window.rows * 5 + 100)  # 50 m a swath
         left.fly(one.window)

@@ -6,8 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from looks_worth import worth_of
 
-from coordinator.cut.ground import OBJECTIVES, Ground
+from coordinator.cut.ground import OBJECTIVES, Ground, _sums
 from coordinator.cut.window import Window
 from planner.types import FloatArray
 
@@ -40,20 +43,15 @@ class TestWorth:
         ],
     )
     def test_it_is_what_a_look_takes_of_what_counts(self, objective: str, worth: list[float]) -> None:
-        told = ground(self.RISK, objective=objective, threshold=0.3).worth()
+        told = worth_of(ground(self.RISK, objective=objective, threshold=0.3))
         assert told[0] == pytest.approx([25 * one for one in worth])
 
     def test_with_a_threshold_of_nothing_the_worst_are_all(self) -> None:
-        told = ground(self.RISK, objective="worst30", threshold=0.0).worth()
-        assert told == pytest.approx(ground(self.RISK).worth() / 0.3)
+        told = worth_of(ground(self.RISK, objective="worst30", threshold=0.0))
+        assert told == pytest.approx(worth_of(ground(self.RISK)) / 0.3)
 
     def test_what_stays_below_the_threshold_does_not_count_for_the_worst(self) -> None:
-        assert not ground(self.RISK, objective="worst30", threshold=0.8).worth().any()
-
-    def test_it_may_be_asked_of_some_cells(self) -> None:
-        one = ground(np.arange(12.0).reshape(3, 4) / 12, objective="both", threshold=0.4)
-        window = Window(1, 3, 1, 2)
-        assert (one.worth(window) == one.worth()[window.cells]).all()
+        assert not worth_of(ground(self.RISK, objective="worst30", threshold=0.8)).any()
 
 
 class TestLeft:
@@ -113,7 +111,7 @@ class TestTurned:
         assert one.turned.weights.tolist() == weights.T.tolist()
         assert one.turned.is_seen.tolist() == is_seen.T.tolist()
         assert (one.turned.objective, one.turned.threshold) == (OBJECTIVES["both"], 0.25)
-        assert one.turned.worth() == pytest.approx(one.worth().T)
+        assert worth_of(one.turned) == pytest.approx(worth_of(one).T)
 
     def test_a_look_flown_in_part_takes_its_part(self) -> None:
         one = ground(np.full((1, 2), 0.8), look=0.5)
@@ -135,7 +133,44 @@ class TestFly:
     def test_what_was_worth_is_less_by_what_was_flown(self) -> None:
         one = ground(np.array([[0.8]]))
         one.fly(Window(0, 1, 0, 1))
-        assert one.worth()[0, 0] == pytest.approx(25 * 0.2)
+        assert worth_of(one)[0, 0] == pytest.approx(25 * 0.2)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    seed=st.integers(0, 1000),
+    windows=st.lists(
+        st.tuples(st.integers(0, 20), st.integers(1, 19), st.integers(0, 30), st.integers(1, 9)), max_size=6
+    ),
+    objective=st.sampled_from(sorted(OBJECTIVES)),
+    with_contacts=st.booleans(),
+)
+def test_each_that_is_flown_leaves_to_the_next_what_a_look_along_it_leaves(
+    seed: int, windows: list[tuple[int, int, int, int]], objective: str, with_contacts: bool
+) -> None:
+    rng = np.random.default_rng(seed)
+    risk, look, weights, shares_of = rng.random((4, 40, 40))
+    one = Ground(risk, look, weights, rng.random((40, 40)) < 0.5, OBJECTIVES[objective], 0.4)
+    if with_contacts:
+        one = replace(one, contacts=rng.random((2, 40, 40)))
+    told = [Window(row, row + rows, column, column + columns) for row, rows, column, columns in windows]
+    shares, least_m2 = shares_of[0, : len(told)].tolist(), (100 * shares_of[1, : len(told)]).tolist()
+    for its_shares, its_least_m2 in ((shares, least_m2), (1.0, -1.0)):
+        flown, expected, left = one.copy(), [], one.copy()
+        found = flown.fly_each(told, its_shares, its_least_m2)
+        for place, window in enumerate(told):
+            worth, cells = worth_of(left)[window.cells], window.cells
+            counts_m2 = worth.sum()
+            expected.append([counts_m2, worth[left.is_seen[cells]].sum(), (left.risk[cells] * left.look[cells]).sum()])
+            if its_shares == 1.0:
+                left.fly(window)
+            elif counts_m2 > least_m2[place]:
+                left.fly(window, shares[place])
+        assert found.tolist() == expected  # to the last bit
+        np.testing.assert_array_equal(flown.risk, left.risk)
+        assert with_contacts is (left.contacts is not None)
+        np.testing.assert_array_equal(flown.contacts, left.contacts)
+        assert found.shape == (len(told), 3)
 
 
 class TestWorstFrom:
@@ -169,8 +204,26 @@ def test_what_a_look_removes_of_a_block_is_what_it_removes_of_its_cells_also_at_
     # At risk are 0.08 + 0.08 + 0.1, 0.05 + 0.15 and 0.12 + 0.03; a look takes 0.04 + 0.02 + 0.1, 0.02 + 0.09 and 0.06.
     assert blocks.risk == pytest.approx(np.array([[0.26 / 0.8, 0.2 / 0.4], [0.15 / 0.3, 0.0]]))
     assert blocks.look == pytest.approx(np.array([[0.16 / 0.26, 0.11 / 0.2], [0.06 / 0.15, 0.0]]))
-    assert blocks.worth() == pytest.approx(np.array([[0.16, 0.11], [0.06, 0.0]]))
+    assert worth_of(blocks) == pytest.approx(np.array([[0.16, 0.11], [0.06, 0.0]]))
     assert blocks.left_m2() == pytest.approx(one.left_m2())
+
+
+@settings(max_examples=60, deadline=None)
+@given(seed=st.integers(0, 1000), rows=st.integers(1, 13), columns=st.integers(1, 13), block=st.integers(1, 5))
+def test_over_blocks_cells_are_summed_row_by_row(seed: int, rows: int, columns: int, block: int) -> None:
+    rng = np.random.default_rng(seed)
+    risk, look, weights = rng.random((3, rows, columns))
+    risk[rng.random(risk.shape) < 0.3], look[rng.random(risk.shape) < 0.2] = 0.0, 0.0
+    is_seen = rng.random(risk.shape) < 0.5
+    blocks = Ground(risk, look, weights, is_seen, OBJECTIVES["mean"], 0.0).in_blocks(block)
+    counts = np.where(risk > 0, weights, 0.0)
+    weight, at_risk, removed, seen = (
+        _sums(one, block) for one in (counts, counts * risk, counts * risk * look, counts * is_seen)
+    )
+    assert blocks.weights.tolist() == weight.tolist()  # all of them to the last bit
+    assert blocks.risk.tolist() == (at_risk / np.where(weight > 0, weight, 1.0)).tolist()
+    assert blocks.look.tolist() == (removed / np.where(at_risk > 0, at_risk, 1.0)).tolist()
+    assert blocks.is_seen.tolist() == (seen > weight / 2).tolist()
 
 
 def test_blocks_hold_what_there_is_of_them_in_a_map_longer_one_way_than_the_other() -> None:
@@ -204,10 +257,10 @@ class TestContacts:
 
     def test_it_is_added_to_the_worth_of_each_cell_by_where_the_strip_runs(self) -> None:
         one, plain = self.with_contacts(), ground(np.array([[0.8, 0.4], [0.4, 0.0]]))
-        assert one.worth() == pytest.approx(plain.worth() + self.ALONG)
-        assert one.turned.worth() == pytest.approx((plain.worth() + self.ACROSS).T)
-        assert one.turned.turned.worth() == pytest.approx(one.worth())
-        assert one.in_blocks(2).worth() == pytest.approx(plain.in_blocks(2).worth() + 5.0)
+        assert worth_of(one) == pytest.approx(worth_of(plain) + self.ALONG)
+        assert worth_of(one.turned) == pytest.approx((worth_of(plain) + self.ACROSS).T)
+        assert worth_of(one.turned.turned) == pytest.approx(worth_of(one))
+        assert worth_of(one.in_blocks(2)) == pytest.approx(worth_of(plain.in_blocks(2)) + 5.0)
 
     def test_looked_at_it_counts_no_more(self) -> None:
         one = self.with_contacts()

@@ -3,6 +3,7 @@ side, by hand, and against every choice there is."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
@@ -13,9 +14,23 @@ from compiling import needs_compiling, times_compiled
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
+from looks_worth import worth_of
 
-from coordinator.cut.ground import OBJECTIVES, Ground
-from coordinator.cut.search import Costs, Counts, Left, _edges, _side_by_side, look_anew
+from coordinator.cut.ground import OBJECTIVES, Ground, _in_blocks
+from coordinator.cut.search import (
+    SPARE_STRIPS,
+    STEP,
+    Costs,
+    Counts,
+    Left,
+    _at,
+    _edges,
+    _side_by_side,
+    _sum,
+    fly_each,
+    look_anew,
+    windows_for,
+)
 from coordinator.cut.search import cut as cut_windows
 from coordinator.cut.strips import Cutting, CuttingRules
 from coordinator.cut.window import Window
@@ -54,9 +69,14 @@ def ground(
     )
 
 
+def at_price(cutting: Cutting, price: float) -> list[Window]:
+    """What is cut at a price, and no less."""
+    return cutting.cut(price, price, math.inf)[0]
+
+
 def cut(risk: FloatArray, rules: CuttingRules = RULES, price: float = PRICE, look: float = LOOK) -> list[Window]:
     """Where a first look is worth its price."""
-    return list(dict.fromkeys(Cutting(GRID, ground(risk, look=look), rules).cut(price)))
+    return list(dict.fromkeys(at_price(Cutting(GRID, ground(risk, look=look), rules), price)))
 
 
 class TestByHand:
@@ -130,16 +150,16 @@ class TestByHand:
     def test_ground_that_counts_more_comes_first(self) -> None:
         told = ground(hot(np.s_[10:40, 2:12], risk=0.8) + hot(np.s_[10:40, 25:35], risk=0.5))
         told.weights[:, 20:] *= 2.0
-        assert list(dict.fromkeys(one.first_column for one in Cutting(GRID, told, RULES).cut(PRICE))) == [25, 2]
+        assert list(dict.fromkeys(one.first_column for one in at_price(Cutting(GRID, told, RULES), PRICE))) == [25, 2]
 
     def test_where_a_look_takes_more_comes_first(self) -> None:
         told = ground(hot(np.s_[10:40, 2:12], np.s_[10:40, 25:35]))
         told.look[:, :20] = 0.5
-        assert list(dict.fromkeys(one.first_column for one in Cutting(GRID, told, RULES).cut(PRICE))) == [25, 2]
+        assert list(dict.fromkeys(one.first_column for one in at_price(Cutting(GRID, told, RULES), PRICE))) == [25, 2]
 
     def test_for_the_worst_only_what_is_above_the_threshold_is_cut(self) -> None:
         told = ground(hot(np.s_[:, 2:12], risk=0.4) + hot(np.s_[:, 25:35], risk=0.9), objective="worst30")
-        assert Cutting(GRID, told, RULES).cut(PRICE) == [Window(0, 60, 25, 35)]
+        assert at_price(Cutting(GRID, told, RULES), PRICE) == [Window(0, 60, 25, 35)]
 
     def test_nothing_hot_gives_nothing(self) -> None:
         assert cut(np.zeros(GRID.shape)) == []
@@ -152,25 +172,25 @@ class TestByHand:
     def test_a_place_is_cut_again_where_it_is_worth_another_look_after_that(self) -> None:
         # A poor look takes 20 m2 a metre, then 12 and 7.2; strips of 150 m cost 190 m at 9 m2, which is 11.4 a metre.
         told = ground(hot(np.s_[10:40, 10:20]), look=0.4)
-        assert Cutting(GRID, told, RULES).cut(9.0) == [Window(10, 40, 10, 20)] * 2
+        assert at_price(Cutting(GRID, told, RULES), 9.0) == [Window(10, 40, 10, 20)] * 2
 
     def test_the_swath_is_never_wider_than_the_sensor_sees(self) -> None:
         grid = GridSpec(EAST, 3.4, 40, 60)
-        windows = Cutting(grid, ground(np.ones(grid.shape), grid), RULES).cut(PRICE)
+        windows = at_price(Cutting(grid, ground(np.ones(grid.shape), grid), RULES), PRICE)
         assert {one.columns_wide for one in windows} == {14}  # 47.6 m; 15 would be 51 m
 
     def test_an_area_narrower_than_the_swath_is_cut_as_it_is(self) -> None:
         grid = GridSpec(EAST, 5, 6, 60)
-        assert Cutting(grid, ground(np.ones(grid.shape), grid), RULES).cut(PRICE) == [Window(0, 60, 0, 6)]
+        assert at_price(Cutting(grid, ground(np.ones(grid.shape), grid), RULES), PRICE) == [Window(0, 60, 0, 6)]
 
     def test_objects_are_worth_a_look_from_the_side_that_counts_and_once(self) -> None:
         # A strip of 95 m costs 135 m at 8.75 m2, which is 1181; along the tracks ten objects count 1300, across 1100.
         contacts = np.zeros((2, *GRID.shape))
         contacts[0, 20:40:2, 15], contacts[1, 20, 15:35:2] = 130, 110
         told = ground(np.zeros(GRID.shape), contacts=contacts)
-        assert Cutting(GRID, told, RULES).cut(PRICE) == [Window(20, 39, 10, 20)]
-        assert Cutting(GRID, told, RULES, across=True).cut(PRICE) == []
-        assert Cutting(GRID, told, RULES, across=True).cut(0.9 * PRICE) == [Window(15, 25, 15, 34, across=True)]
+        assert at_price(Cutting(GRID, told, RULES), PRICE) == [Window(20, 39, 10, 20)]
+        assert at_price(Cutting(GRID, told, RULES, across=True), PRICE) == []
+        assert at_price(Cutting(GRID, told, RULES, across=True), 0.9 * PRICE) == [Window(15, 25, 15, 34, across=True)]
         assert np.array_equal(told.contacts, contacts)  # type: ignore[arg-type]
 
 
@@ -210,13 +230,13 @@ class TestLengths:
         grid = GridSpec(EAST, 5, 10, 10)
         told = ground(np.ones(grid.shape), grid, look=0.1)
         rules = CuttingRules(swath_m=5, overhead_m=1, min_strip_m=5, max_strip_m=5)
-        found = Cutting(grid, told, rules).cut(0.01)
+        found = at_price(Cutting(grid, told, rules), 0.01)
         assert len(found) == 600
         assert len({*found}) == 100
 
     def test_a_place_is_cut_six_times_at_most(self) -> None:
         told = ground(hot(np.s_[10:40, 10:20]), look=0.1)
-        assert Cutting(GRID, told, RULES).cut(0.1) == [Window(10, 40, 10, 20)] * 6
+        assert at_price(Cutting(GRID, told, RULES), 0.1) == [Window(10, 40, 10, 20)] * 6
 
 
 def pieces_of(first: int, end: int, shortest: int, longest: int) -> list[tuple[int, int]]:
@@ -247,9 +267,9 @@ def test_windows_lie_on_the_grid_are_as_long_as_allowed_lie_apart_and_pay_for_th
     risk: FloatArray, rules: CuttingRules, look: float, price: float, objective: str
 ) -> None:
     told = ground(risk, SMALL, look, objective)
-    worth = told.worth()
+    worth = worth_of(told)
     found: list[Window] = []
-    for window in Cutting(SMALL, told, rules).cut(price):
+    for window in at_price(Cutting(SMALL, told, rules), price):
         assert 0 <= window.first_row < window.end_row <= SMALL.rows
         assert 0 <= window.first_column < window.end_column <= SMALL.columns
         assert window.columns_wide == round(rules.swath_m / SMALL.cell_m)
@@ -284,45 +304,64 @@ def test_what_is_cut_further_is_cut_as_of_the_ground_as_it_was_left(
         for known, anew in zip(cutting._left[:6], new._left[:6], strict=True):
             assert (known == anew).all()  # to the last bit
         lies = left.turned if across else left
-        assert (cutting._left.worth == lies.worth()).all()
+        assert (cutting._left.worth == worth_of(lies)).all()
         width = lies.risk.shape[1] - len(cutting._left.sums) + 1
-        sums = [lies.worth()[:, first : first + width].sum(axis=1) for first in range(len(cutting._left.sums))]
+        sums = [worth_of(lies)[:, first : first + width].sum(axis=1) for first in range(len(cutting._left.sums))]
         assert cutting._left.sums == pytest.approx(np.array(sums))
-        found = new.cut(price)
-        assert cutting.copy().cut(price) == found
-        assert cutting.cut(price) == found
+        found = at_price(new, price)
+        cutting._left.is_known[:] = False
+        again = cut_windows(cutting._left, cutting._counts, _at(price, cutting._metres)).tolist()
+        assert [Window(*each) for each in again] == [one.turned if across else one for one in found]
         for window in found:
             left.fly(window)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(
     risk=risks,
     contacts=objects,
     rules=rules_of_all_kinds,
-    prices=st.lists(st.sampled_from([0.2, 1.0]), min_size=2, max_size=2),
+    last_price=st.sampled_from([0.2, 0.3, 1.0, 5.0, 50.0]),
+    time_m=st.sampled_from([1.0, 40.0, 100.0, 300.0, math.inf]),
     across=st.booleans(),
 )
-def test_of_a_cutting_and_its_copy_each_is_cut_as_if_the_other_were_not(
-    risk: FloatArray, contacts: FloatArray | None, rules: CuttingRules, prices: list[float], across: bool
+def test_for_some_time_they_are_cut_at_the_price_at_which_they_are_so_many_and_then_some_to_spare(
+    risk: FloatArray,
+    contacts: FloatArray | None,
+    rules: CuttingRules,
+    last_price: float,
+    time_m: float,
+    across: bool,
 ) -> None:
-    def begun() -> Cutting:
-        """One that has been cut at a high price."""
-        new = Cutting(SMALL, ground(risk, SMALL, contacts=contacts), rules, across=across)
-        new.cut(3.0)
-        return new
+    least = 0.2
 
-    def state(one: Cutting) -> list[list[float]]:
-        return [array.tolist() for array in one._left]
+    def left_at(price: float) -> tuple[Cutting, list[Window]]:
+        left = Cutting(SMALL, ground(risk, SMALL, contacts=contacts), rules, across=across)
+        return left, further(left, price)
 
-    one, expected = begun(), [begun().cut(price) for price in prices]
-    other, before = one.copy(), state(one)
-    assert state(other) == before
-    assert other.cut(prices[0]) == expected[0]
-    assert state(one) == before
-    after = state(other)
-    assert one.cut(prices[1]) == expected[1]
-    assert state(other) == after
+    def further(left: Cutting, price: float) -> list[Window]:
+        left._left.is_known[:] = False
+        found = cut_windows(left._left, left._counts, _at(price, left._metres)).tolist()
+        return [Window(*each).turned if across else Window(*each) for each in found]
+
+    def metres(windows: list[Window]) -> float:
+        return sum(rules.metres_flown(one.cells_long * SMALL.cell_m) for one in windows)
+
+    price = last_price
+    while metres(left_at(price)[1]) < time_m and price > least:
+        price = max(least, price / STEP)
+    while metres(left_at(price)[1]) >= time_m and metres(left_at(price * STEP)[1]) >= time_m:
+        price *= STEP
+    left, expected = left_at(price)
+    spare = price
+    while metres(expected) < time_m + SPARE_STRIPS * metres(expected) / max(1, len(expected)) and spare > least:
+        spare = max(least, spare / STEP**2)
+        expected += further(left, spare)
+
+    cutting = Cutting(SMALL, ground(risk, SMALL, contacts=contacts), rules, across=across)
+    before = [array.tolist() for array in cutting._left]
+    assert cutting.cut(last_price, least, time_m) == (expected, price)
+    assert [array.tolist() for array in cutting._left] == before  # what is cut is a copy
 
 
 @settings(max_examples=60, deadline=None)
@@ -332,8 +371,8 @@ def test_across_the_tracks_they_are_cut_as_along_them_on_the_map_turned(
 ) -> None:
     told = ground(risk, SMALL)
     turned = GridSpec(SMALL.frame, SMALL.cell_m, SMALL.rows, SMALL.columns)
-    across = Cutting(SMALL, told, rules, across=True).cut(price)
-    assert [one.turned for one in across] == Cutting(turned, ground(risk.T.copy(), turned), rules).cut(price)
+    across = at_price(Cutting(SMALL, told, rules, across=True), price)
+    assert [one.turned for one in across] == at_price(Cutting(turned, ground(risk.T.copy(), turned), rules), price)
     assert all(one.across for one in across)
     assert (told.risk == risk).all()
 
@@ -519,6 +558,16 @@ def test_for_ground_of_all_kinds_the_cutting_is_compiled_once() -> None:
             told = ground(hot(np.s_[10:40, 15:19]), objective=objective, contacts=objects_there)
             for its_rules in rules:
                 for across in (False, True):
-                    Cutting(GRID, told, its_rules, across=across).copy().cut(PRICE)
-    for one in (cut_windows, look_anew):
+                    found, _ = Cutting(GRID, told, its_rules, across=across).cut(PRICE, 0.1, 1000.0)
+                    told.in_blocks(2).copy().fly_each([])
+                    told.copy().fly_each(found)
+                    told.copy().fly_each(found, [0.5] * len(found), 10.0)
+    for one in (windows_for, fly_each, look_anew, _in_blocks):
         assert times_compiled(one) == 1
+
+
+@given(count=st.integers(0, 3000), seed=st.integers(0, 9))
+def test_sums_are_those_of_numpy_to_the_last_bit(count: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    values = rng.random(count + 1) * 10.0 ** rng.integers(-8, 8, count + 1)
+    assert _sum(values, count) == values[:count].sum()
