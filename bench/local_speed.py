@@ -14,6 +14,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import functools
+import gc
 import hashlib
 import json
 import tempfile
@@ -150,6 +151,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     scenario = load_scenario(options.scenario, (), None)
     said: list[Received] = []
     fly(scenario, said.append)
+    gc.freeze()  # as `secondlook run` does; nor is the collector to go through what is kept here for the references
     wall_s, bare_s, bus_s, summary = [], [], [], {}
     for _ in range(options.runs):
         bare_s.append(bare_loop_s(said))

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from comms.node import random_stream
 from comms.said.messages import Look, LookContact, Maneuver, TruthLook
 from planner.types import BoolArray, FloatArray, Point
 from sim_world.config import VehicleConfig
@@ -16,7 +17,6 @@ from sim_world.footprints import FOOTPRINTS
 from sim_world.footprints.swath import Swath
 from sim_world.sonar import CurveSonar, SonarModel
 from sim_world.steadiness import STILL_WATER, Steadiness, Stream
-from sim_world.streams import NumberedStreams
 from sim_world.targets import NO_TARGETS, Recogniser, Targets
 from sim_world.vehicle import Stretch
 
@@ -64,7 +64,6 @@ class Looks:
         self._clutter = clutter
         self._recogniser = recogniser
         self._seed = seed
-        self._streams: dict[str, NumberedStreams] = {}
         self._estimates = Estimates(config.sensor, self._stream)
         # Then nothing but the range tells how well a cell is seen, and of how well that is believed to be.
         self._cells_are_alike = (
@@ -191,7 +190,4 @@ class Looks:
         return Sight(p_detect, range_m, bearing_rad, straight_m)
 
     def _stream(self, name: str, number: int) -> np.random.Generator:
-        streams = self._streams.get(name)
-        if streams is None:
-            streams = self._streams[name] = NumberedStreams(self._seed, "world", self._config.vehicle, name)
-        return streams(number)
+        return random_stream(self._seed, "world", self._config.vehicle, name, str(number))

@@ -144,9 +144,10 @@ class Ground:
 def _worst_from(risk: FloatArray) -> float:
     """From which on these are of the worst, at least one: `numpy.quantile` tells the same, with more ado."""
     place = (risk.size - 1) * (1.0 - WORST)
-    below, above = int(place), min(int(place) + 1, risk.size - 1)
-    ordered = np.partition(risk, (below, above))
-    low, high, share = float(ordered[below]), float(ordered[above]), place - below
+    below = int(place)
+    ordered, share = np.partition(risk, below), place - below
+    low = float(ordered[below])
+    high = float(ordered[below + 1 :].min()) if below + 1 < risk.size else low
     return low + (high - low) * share if share < 0.5 else high - (high - low) * (1 - share)
 
 
