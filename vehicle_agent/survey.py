@@ -34,11 +34,14 @@ from planner.profile_spacing import Known, SpacingTerms, known_before
 from planner.risk import HIGHEST_P_DETECT, residual_risk
 from planner.spacing_planners import SpacingDecision
 from planner.sweep import Pass, pass_over
-from planner.types import BoolArray, DetectionCurve, FloatArray, Track
+from planner.types import BoolArray, DetectionCurve, FloatArray, Track, Window
 from vehicle_agent.agent import Agent
 from vehicle_agent.config import WHOLE, SurveyConfig
 from vehicle_agent.helpers_ahead import helper_looks
 from vehicle_agent.part_survey import PartSurvey
+
+Rectangle = tuple[tuple[float, float], tuple[float, float], Window]
+"""From where to where across a part and along it, of which window of the grid."""
 
 HOTSPOTS_EVERY_MS = 30_000
 UNSEEN = DetectionCurve(np.array([0.0, 1.0]), np.zeros(2))
@@ -65,6 +68,7 @@ class SurveyAgent(Agent):
         self._range_bin_m = 0.0
         self._along_bin_m = 0.0
         self._reach: Reach | None = None
+        self._kept_beyond: dict[int, tuple[Rectangle, BoolArray]] = {}  # see _beyond
         self._run_out_ms = 0  # until when it sails straight on behind its last track
         self._looked_to_m: float | None = None  # along the track under way, in the grid's frame
         self._plan_revision = 0
@@ -347,9 +351,9 @@ class SurveyAgent(Agent):
         r_eff_m = self.r_eff_m[-1] if self.r_eff_m else None
         frontier_m = part.frontier_m(self.ahead, self._reach, r_eff_m, self._grid.cell_m)
         if frontier_m is not None:
-            there &= ~self._cells_within(part, frontier_m, far_m)
-        for later in self._parts[self._part + 1 :]:
-            there &= ~self._cells_within(later, -far_m, far_m)
+            there &= self._beyond(self._part, frontier_m, far_m)
+        for later in range(self._part + 1, len(self._parts)):
+            there &= self._beyond(later, -far_m, far_m)
         self.coverage.settled = settled
 
     def _still_ahead(self, track: Track) -> Ahead:
@@ -363,12 +367,15 @@ class SurveyAgent(Agent):
             from_m = self._looked_to_m
         return Ahead(self._across_m(track), min(from_m, end_m), max(from_m, end_m))
 
-    def _cells_within(self, part: PartSurvey, from_across_m: float, beyond_m: float) -> BoolArray:
-        """Cells of the window about the area that tracks over a part, from an offset on, may see."""
-        margin_m = self._grid.cell_m + self._along_bin_m + self.footprint.ahead_m
-        across_m = (from_across_m, part.area.width_m + beyond_m)
-        along_m = (-margin_m, part.area.length_m + margin_m)
-        return cells_within(self._grid, part.area.frame, across_m, along_m, self._hotspots.window)
+    def _beyond(self, number: int, from_across_m: float, far_m: float) -> BoolArray:
+        """Cells of the window about the area that tracks over a part, from an offset on, cannot see. As that stays the
+        same for a while it is kept."""
+        area, margin_m = self._parts[number].area, self._grid.cell_m + self._along_bin_m + self.footprint.ahead_m
+        across_m, along_m = (from_across_m, area.width_m + far_m), (-margin_m, area.length_m + margin_m)
+        rests_on, kept = (across_m, along_m, self._hotspots.window), self._kept_beyond.get(number)
+        if kept is None or kept[0] != rests_on:
+            kept = self._kept_beyond[number] = rests_on, ~cells_within(self._grid, area.frame, *rests_on)
+        return kept[1]
 
     def _find_hotspots(self, now_ms: int) -> None:
         assert self.coverage is not None

@@ -144,10 +144,7 @@ class Ground:
 def _worst_from(risk: FloatArray) -> float:
     """From which on these are of the worst, at least one: `numpy.quantile` tells the same, with more ado."""
     place = (risk.size - 1) * (1.0 - WORST)
-    below = int(place)
-    ordered, share = np.partition(risk, below), place - below
-    low = float(ordered[below])
-    high = float(ordered[below + 1 :].min()) if below + 1 < risk.size else low
+    share, (low, high) = place - int(place), _in_order(risk, int(place))
     return low + (high - low) * share if share < 0.5 else high - (high - low) * (1 - share)
 
 
@@ -199,3 +196,40 @@ def _sums(values: FloatArray, block: int) -> FloatArray:
             of_row += padded[row::block, column::block]
         sums += of_row
     return sums
+
+
+BINS = 1024
+
+
+@compiled
+def _in_order(values: FloatArray, place: int) -> tuple[float, float]:
+    """The value at a place, if they were put in order, and the next one, where there is one, else the same. Values are
+    counted by bins, and then those of the bin in which it lies by finer ones, until all in it are alike: to order them
+    takes two to four times as long."""
+    low, high = values.min(), values.max()
+    before, counts = 0, np.zeros(BINS + 1, np.int64)
+    while low < high:
+        bins_a_unit = BINS / (high - low)
+        counts[:] = 0
+        for value in values:
+            if low <= value <= high:
+                counts[int((value - low) * bins_a_unit)] += 1
+        number = 0
+        while before + counts[number] <= place:
+            before += counts[number]
+            number += 1
+        its_low, its_high = high, low
+        for value in values:
+            if low <= value <= high and int((value - low) * bins_a_unit) == number:
+                its_low, its_high = min(its_low, value), max(its_high, value)
+        low, high = its_low, its_high
+    following, count = np.inf, before
+    for value in values:
+        if value == low:
+            count += 1
+        elif low < value < following:
+            following = value
+    return low, low if place + 1 < count or following == np.inf else following
+
+
+_in_order.called_with(lambda: (np.zeros(1), 0))

@@ -17,6 +17,7 @@ from coordinator.expect.hotspots import Hotspots
 from coordinator.expect.seabed import Seabed
 from coordinator.expect.tracks import ExpectedTracks
 from coordinator.fleet import KnownFleet
+from planner.compiled import compiled
 from planner.risk import HIGHEST_P_DETECT, MOST_LEVELS, NATS_PER_LEVEL, LevelArray
 from planner.rounding import rounded
 from planner.types import BoolArray, FloatArray
@@ -89,12 +90,26 @@ class ExpectedMap:
         """-ln(1 - P_d) of all looks so far, summed over those of primaries and of helpers, and the level of the largest
         of all."""
         shape, cells = self.grid.shape, self._place.cells
-        primaries, helpers, nats = np.zeros((3, *shape))
+        primaries, helpers = np.zeros((2, *shape))
         largest_levels = np.zeros(shape, dtype=np.uint8)
         for name, layer in self._fleet.map.layers.items():
-            if not layer.sum_levels[cells].any():
-                continue  # as most of a large fleet's elsewhere
-            sums = primaries if name in self._fleet.primaries else helpers
-            sums += np.multiply(layer.sum_levels[cells], NATS_PER_LEVEL, out=nats)
-            np.maximum(largest_levels, layer.largest_levels[cells], out=largest_levels)
+            levels = np.ascontiguousarray(layer.sum_levels[cells])
+            if levels.any():  # most of a large fleet's are elsewhere
+                nats = primaries if name in self._fleet.primaries else helpers
+                largest = np.ascontiguousarray(layer.largest_levels[cells])
+                _add(nats, largest_levels, levels, largest, NATS_PER_LEVEL)
         return primaries, helpers, largest_levels
+
+
+@compiled
+def _add(
+    nats: FloatArray, largest_levels: LevelArray, levels: LevelArray, its_largest: LevelArray, nats_a_level: float
+) -> None:
+    """Adds what one vehicle has seen to a sum, and to the largest single look."""
+    for row in range(levels.shape[0]):
+        for column in range(levels.shape[1]):
+            nats[row, column] += levels[row, column] * nats_a_level
+            largest_levels[row, column] = max(largest_levels[row, column], its_largest[row, column])
+
+
+_add.called_with(lambda: (np.zeros((1, 1)), *np.zeros((3, 1, 1), dtype=np.uint8), 1.0))

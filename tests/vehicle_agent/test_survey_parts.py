@@ -204,12 +204,13 @@ def test_which_cells_tracks_of_a_part_may_see() -> None:
     node, maneuver = node_of(agent), to_follow(agent)
     assert maneuver is not None
     agent.hear(f"veh/{PRIMARY}/look", replace(look(maneuver, 1, 0, 4, SEES_TO_130_M), along_bin_m=8))
-    cells = node._cells_within(node._parts[1], -45, 75)
+    cells = ~node._beyond(1, -45, 75)
     expected = np.zeros_like(cells)
     expected[:37, 26:] = True  # up to 365 m, from 260 m on
     assert (cells == expected).all()
-    assert not node._cells_within(node._parts[1], 500, 0).any()
-    assert node._cells_within(node._parts[1], 490, 15)[0].nonzero()[0].tolist() == [80]
+    assert node._beyond(1, 500, 0).all()
+    assert (~node._beyond(1, 490, 15))[0].nonzero()[0].tolist() == [80]
+    assert (node._beyond(1, -45, 75) == ~expected).all()
 
 
 class TestAnyArea:

@@ -6,11 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from compiling import needs_compiling, times_compiled
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
 from looks_worth import worth_of
 
-from coordinator.cut.ground import OBJECTIVES, Ground, _sums
+from coordinator.cut.ground import OBJECTIVES, Ground, _in_order, _sums
 from coordinator.cut.window import Window
 from planner.types import FloatArray
 
@@ -244,6 +246,26 @@ def test_from_which_risk_on_it_is_of_the_worst_is_a_quantile_to_the_last_bit(siz
         risk = np.random.default_rng(seed).uniform(0.01, 1.0, (1, size))
         assert ground(risk).worst_from() == np.quantile(risk, 0.7)
     assert ground(np.zeros((1, size))).worst_from() == 0.0
+
+
+@given(
+    values=arrays.arrays(
+        np.float64, st.integers(1, 60), elements=st.floats(1e-9, 1.0) | st.sampled_from([0.25, 0.25 + 2**-54, 0.5, 1.0])
+    ),
+    share=st.floats(0.0, 1.0),
+)
+def test_which_value_is_at_a_place_in_order_and_which_next(values: FloatArray, share: float) -> None:
+    place = round(share * (values.size - 1))
+    ordered = sorted(values.tolist())
+    assert _in_order(values, place) == (ordered[place], ordered[min(place + 1, values.size - 1)])
+
+
+@needs_compiling
+def test_what_is_in_order_is_found_by_one_compiled_function() -> None:
+    one = ground(np.linspace(0.1, 0.9, 12).reshape(3, 4))
+    assert one.left_m2() > 0.0
+    assert one.in_blocks(2).worst_from() > 0.5
+    assert times_compiled(_in_order) == 1
 
 
 class TestContacts:
