@@ -206,30 +206,27 @@ def _in_order(values: FloatArray, place: int) -> tuple[float, float]:
     """The value at a place, if they were put in order, and the next one, where there is one, else the same. Values are
     counted by bins, and then those of the bin in which it lies by finer ones, until all in it are alike: to order them
     takes two to four times as long."""
-    low, high = values.min(), values.max()
-    before, counts = 0, np.zeros(BINS + 1, np.int64)
+    before, following, counts, left = 0, np.inf, np.empty(BINS + 1, np.int64), values
+    low, high = left.min(), left.max()
     while low < high:
         bins_a_unit = BINS / (high - low)
         counts[:] = 0
-        for value in values:
-            if low <= value <= high:
-                counts[int((value - low) * bins_a_unit)] += 1
+        for value in left:
+            counts[int((value - low) * bins_a_unit)] += 1
         number = 0
         while before + counts[number] <= place:
             before += counts[number]
             number += 1
-        its_low, its_high = high, low
-        for value in values:
-            if low <= value <= high and int((value - low) * bins_a_unit) == number:
-                its_low, its_high = min(its_low, value), max(its_high, value)
-        low, high = its_low, its_high
-    following, count = np.inf, before
-    for value in values:
-        if value == low:
-            count += 1
-        elif low < value < following:
-            following = value
-    return low, low if place + 1 < count or following == np.inf else following
+        there, count = np.empty(counts[number]), 0
+        for value in left:
+            its_number = int((value - low) * bins_a_unit)
+            if its_number == number:
+                there[count] = value
+                count += 1
+            elif its_number > number:
+                following = min(following, value)
+        left, low, high = there, there.min(), there.max()
+    return low, low if place + 1 < before + left.size or following == np.inf else following
 
 
 _in_order.called_with(lambda: (np.zeros(1), 0))
