@@ -141,7 +141,7 @@ class StripLife:
             self._hear_no_work(vehicle, header, now_ms)
 
     def hear_status(self, vehicle: KnownVehicle, header: Header, status: TaskStatus, now_ms: int) -> None:
-        """A vehicle tells how far it is with a strip."""
+        """A vehicle tells how it stands with a strip."""
         if not vehicle.hear_word_of(status.strip, header):
             return
         vehicle.unanswered = 0
