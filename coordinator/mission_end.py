@@ -1,5 +1,5 @@
-"""When the mission is over: asking for what has not arrived by then, and saying so again to those who may not have
-heard it."""
+"""When the mission is over, and saying so again to those who may not have heard it; asking for what has not arrived,
+without which it may not be over."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from coordinator.sectors import Sectors
 from coordinator.strip_life import StripLife
 from coordinator.vehicles import KnownVehicle
 
-# Who lacks something is asked for it at first after a little, as what is under way may take longer than the state that
-# tells of it; then so often, and while primaries survey, which have much else to say, so often.
+# Who lacks something is asked for it after the first of these times, as what is under way may take longer than the
+# state that tells of it; again after the second, or while primaries survey, which have much else to say, the third.
 ASK_AFTER_MS, ASK_EVERY_MS, ASK_WHILE_SURVEYING_MS = 1000, 10_000, 60_000
 SAY_AGAIN_AFTER_MS = (*range(10, 100, 10), *range(1000, 10_000, 1000))
 
@@ -42,6 +42,8 @@ class MissionEnd:
     ) -> None:
         self.over: MissionOver | None = None
         self._over_ms = 0
+        self._lacks_since_ms: dict[str, int] = {}  # of whom something has not arrived
+        self._asked_ms: dict[str, int] = {}  # when each was last asked to tell again
         self._config = config
         self._fleet = fleet
         self._strips = strips
@@ -54,7 +56,7 @@ class MissionEnd:
         """Finds whether the mission is over, and says so; asks for what has not arrived."""
         left, surveying = self._strips.unended, self._fleet.surveying
         lacking = self._fleet.lacking(now_ms)
-        self._ask(lacking, now_ms, ASK_WHILE_SURVEYING_MS if surveying else ASK_EVERY_MS)
+        self._ask(lacking, now_ms)
         returning = any(one.is_returning for one in self._fleet.vehicles.values())
         given_up = ", ".join(name for name, one in self._fleet.primaries.items() if one.is_given_up)
         given_up = f"; given up before the end of its survey: {given_up}" if given_up else ""
@@ -79,26 +81,30 @@ class MissionEnd:
         self._agenda.add(Item.SAY_OVER, now_ms + SAY_AGAIN_AFTER_MS[0])
 
     def note_state(self, vehicle: KnownVehicle, now_ms: int) -> None:
-        """A vehicle's newest state may tell of something that has not arrived: soon it is asked for that."""
-        if vehicle.lacks and self._agenda.deadline_ms(Item.ASK_AGAIN) is None:
-            self._agenda.add(Item.ASK_AGAIN, now_ms + ASK_AFTER_MS)
+        """A vehicle's newest state may tell of something that has not arrived: it is asked for that in time."""
+        if vehicle.lacks:
+            self._agenda.add(Item.ASK_AGAIN, self._ask_ms(vehicle, now_ms))
 
-    def _ask(self, lacking: list[KnownVehicle], now_ms: int, every_ms: int) -> None:
+    def _ask(self, lacking: list[KnownVehicle], now_ms: int) -> None:
         """Asks those of whom something has not arrived to tell it again, until all has; then it is cut by, at once
         where every primary has finished."""
-        due_ms = self._agenda.deadline_ms(Item.ASK_AGAIN)
-        if not lacking:
-            if due_ms is not None:
-                self._agenda.strike(Item.ASK_AGAIN, due_ms)
-                if not self._fleet.surveying:
-                    self._sectors.cut_by(now_ms)
-            return
-        asks = bool(self._agenda.strike(Item.ASK_AGAIN, now_ms))
-        self._agenda.add(Item.ASK_AGAIN, now_ms + (ASK_AFTER_MS if due_ms is None else every_ms))
-        if asks:
-            for one in lacking:
+        if self._lacks_since_ms and not lacking and not self._fleet.surveying:
+            self._sectors.cut_by(now_ms)
+        names = {one.entry.vehicle for one in lacking}
+        self._lacks_since_ms = {name: ms for name, ms in self._lacks_since_ms.items() if name in names}
+        self._agenda.strike(Item.ASK_AGAIN, now_ms)
+        for one in lacking:
+            if self._ask_ms(one, now_ms) <= now_ms:
+                self._asked_ms[one.entry.vehicle] = now_ms
                 if not one.lost:
                     self._outbox.add_task(TaskAction.TELL_AGAIN, one.entry.vehicle)
+            self._agenda.add(Item.ASK_AGAIN, self._ask_ms(one, now_ms))
+
+    def _ask_ms(self, vehicle: KnownVehicle, now_ms: int) -> int:
+        """When a vehicle of which something has not arrived is to be asked for it."""
+        name, every_ms = vehicle.entry.vehicle, ASK_WHILE_SURVEYING_MS if self._fleet.surveying else ASK_EVERY_MS
+        since_ms = self._lacks_since_ms.setdefault(name, now_ms)
+        return max(since_ms + ASK_AFTER_MS, self._asked_ms.get(name, -every_ms) + every_ms)
 
     def _cut_is_left(self, now_ms: int) -> bool:
         """Whether there is news that was not cut by; if so that is done at once."""

@@ -61,7 +61,7 @@ _called: list[tuple[Compiled[..., Any], Callable[[], tuple[Any, ...]]]] = []
 
 def compile_all() -> None:
     """Compiles what is called from without of all modules that are loaded, or reads it from disk: so that nobody waits
-    for that once time matters. The first time on a machine it takes some ten seconds."""
+    for that once time matters. The first time on a machine it takes some fifteen seconds."""
     while _called:
         one, sample = _called.pop()
         one(*sample())

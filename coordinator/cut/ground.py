@@ -208,7 +208,7 @@ def _in_order(values: FloatArray, place: int) -> tuple[float, float]:
     takes two to four times as long."""
     before, following, counts, left = 0, np.inf, np.empty(BINS + 1, np.int64), values
     low, high = left.min(), left.max()
-    while low < high:
+    while low < high and BINS / (high - low) < np.inf:  # of less apart there are none in a map
         bins_a_unit = BINS / (high - low)
         counts[:] = 0
         for value in left:

@@ -425,8 +425,15 @@ class TestWhatHasNotArrived:
         assert asked_ms == [1000, 61_000, 121_000]
         assert set(told.tasks()) == {(PRIMARY, TaskAction.TELL_AGAIN, 0)}
         told.layer(PRIMARY, np.full(GRID.shape, 0.1))
-        told.keep_alive([PRIMARY, HELPER], 130)
-        assert len(told.tasks()) == 3
+        told.keep_alive([PRIMARY, HELPER], 30)
+        told.state(PRIMARY, Mode.SURVEY, 1, tiles_told=ALL_TILES + 1)  # of this something is missing again
+        told.state(HELPER, Mode.IDLE, tiles_told=1)  # and of another for the first time
+        since_ms = told.node.now_ms - began_ms
+        told.keep_alive([PRIMARY, HELPER], 40)
+        asked = [
+            (one.key.split("/")[2], one.at_ms - began_ms) for one in told.node.said if isinstance(one.message, Task)
+        ]
+        assert asked[3:] == [(HELPER, since_ms + 1000), (PRIMARY, 181_000)]
 
     @pytest.mark.parametrize("is_badly_seen", [False, True])
     def test_when_it_has_come_it_is_cut_by_before_it_is_over(self, is_badly_seen: bool) -> None:
