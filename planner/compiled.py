@@ -30,8 +30,13 @@ class Compiled(Generic[P, R]):
         self._function = function
 
     def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
-        """Calls it."""
-        made: R = self.made(*args, **kwargs)
+        """Calls it. Of a signal that comes meanwhile numba makes an error of its own: what was raised for it counts."""
+        try:
+            made: R = self.made(*args, **kwargs)
+        except SystemError as error:
+            if error.__cause__ is None or isinstance(error.__cause__, Exception):
+                raise
+            raise error.__cause__ from None
         return made
 
     @cached_property

@@ -163,3 +163,20 @@ def test_what_is_compiled_already_is_not_asked_for_again() -> None:
     compile_all()
     compile_all()
     assert calls == [1]
+
+
+def test_an_interrupt_that_comes_while_it_runs_is_what_is_raised() -> None:
+    def interrupted() -> None:
+        try:
+            raise KeyboardInterrupt
+        except KeyboardInterrupt as interrupt:
+            raise SystemError("returned a result with an exception set") from interrupt
+
+    def fails() -> None:
+        raise SystemError("for no other reason")
+
+    for function, raises in ((interrupted, KeyboardInterrupt), (fails, SystemError)):
+        one = Compiled(function)
+        one.made = function
+        with pytest.raises(raises):
+            one()
