@@ -83,28 +83,28 @@ class MissionEnd:
     def note_state(self, vehicle: KnownVehicle, now_ms: int) -> None:
         """A vehicle's newest state may tell of something that has not arrived: it is asked for that in time."""
         if vehicle.lacks:
-            self._agenda.add(Item.ASK_AGAIN, self._ask_ms(vehicle, now_ms))
+            self._lacks_since_ms.setdefault(vehicle.entry.vehicle, now_ms)
+            self._agenda.add(Item.ASK_AGAIN, self._ask_ms(vehicle))
 
     def _ask(self, lacking: list[KnownVehicle], now_ms: int) -> None:
         """Asks those of whom something has not arrived to tell it again, until all has; then it is cut by, at once
         where every primary has finished."""
         if self._lacks_since_ms and not lacking and not self._fleet.surveying:
             self._sectors.cut_by(now_ms)
-        names = {one.entry.vehicle for one in lacking}
-        self._lacks_since_ms = {name: ms for name, ms in self._lacks_since_ms.items() if name in names}
+        names = [one.entry.vehicle for one in lacking]
+        self._lacks_since_ms = {name: self._lacks_since_ms.get(name, now_ms) for name in names}
         self._agenda.strike(Item.ASK_AGAIN, now_ms)
         for one in lacking:
-            if self._ask_ms(one, now_ms) <= now_ms:
+            if self._ask_ms(one) <= now_ms:
                 self._asked_ms[one.entry.vehicle] = now_ms
                 if not one.lost:
                     self._outbox.add_task(TaskAction.TELL_AGAIN, one.entry.vehicle)
-            self._agenda.add(Item.ASK_AGAIN, self._ask_ms(one, now_ms))
+            self._agenda.add(Item.ASK_AGAIN, self._ask_ms(one))
 
-    def _ask_ms(self, vehicle: KnownVehicle, now_ms: int) -> int:
+    def _ask_ms(self, vehicle: KnownVehicle) -> int:
         """When a vehicle of which something has not arrived is to be asked for it."""
         name, every_ms = vehicle.entry.vehicle, ASK_WHILE_SURVEYING_MS if self._fleet.surveying else ASK_EVERY_MS
-        since_ms = self._lacks_since_ms.setdefault(name, now_ms)
-        return max(since_ms + ASK_AFTER_MS, self._asked_ms.get(name, -every_ms) + every_ms)
+        return max(self._lacks_since_ms[name] + ASK_AFTER_MS, self._asked_ms.get(name, -every_ms) + every_ms)
 
     def _cut_is_left(self, now_ms: int) -> bool:
         """Whether there is news that was not cut by; if so that is done at once."""

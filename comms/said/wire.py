@@ -57,7 +57,7 @@ class Quick(NamedTuple):
 
     encode: str
     decode: str
-    again: str = "{got}"
+    again: str
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ class Whole:
     @property
     def quick(self) -> Quick:
         plain = f"v if type(v := {{got}}) is int and {self.low} <= v <= {self.high} else {{slow}}(v)"
-        return Quick(plain, plain)
+        return Quick(plain, plain, "{got}")
 
 
 @dataclass(frozen=True)
@@ -132,7 +132,7 @@ class Flag:
     @property
     def quick(self) -> Quick:
         plain = "v if type(v := {got}) is bool else {slow}(v)"
-        return Quick(plain, plain)
+        return Quick(plain, plain, "{got}")
 
 
 @dataclass(frozen=True)

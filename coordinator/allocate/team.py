@@ -47,8 +47,8 @@ class Team:
             starts = np.array([helpers[number].free_at for number in some], dtype=np.float64)
             its_s, chosen = table.ways.shortest_from_each([table.leave.reshape(-1, 3), starts])
             for place, number in enumerate(some):
-                one, its = tables[number], (self.table[number], self.way[number])
-                _fill(*its, its_s, chosen, place, table.sonar_on_s, one.home_s, one.worth_m2, ways)
+                one, its_table, its_way = tables[number], self.table[number], self.way[number]
+                _fill(its_table, its_way, its_s, chosen, place, table.sonar_on_s, one.home_s, one.worth_m2, ways)
                 if helpers[number].task is None and helpers[number].waits_s:
                     self.table[number, self.start, 0] += helpers[number].wait_s(self.strips)
         self.run_out_s = np.array([one.run_in_m / one.speed_mps for one in helpers], dtype=np.float64)
