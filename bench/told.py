@@ -21,8 +21,7 @@ def told_beforehand(mission: Removable) -> AbstractContextManager[object]:
         def now(self) -> Expectation:
             """See `ExpectedMap`."""
             cells = self._place.cells
-            _, by_helpers, _ = self._told_so_far()
-            risk = rounded(mission.risk[cells] * np.exp(-by_helpers))
+            risk = rounded(mission.risk[cells] * np.exp(-self._told(surveys=False)))
             return Expectation(risk, look[cells], super().now().is_seen)
 
     return patch("coordinator.coordinator.ExpectedMap", Told)

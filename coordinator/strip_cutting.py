@@ -138,8 +138,10 @@ class StripCutting:
         self._goal.hear_expected(sector.number, *self._cutter.leaves_m2)
         for found in cuts:
             cut = replace(found, window=found.window.moved(place.first_row, place.first_column))
-            alike = (record for record in unmatched if record.window.across == cut.window.across)
-            same = max(alike, key=lambda record: record.window.overlap(cut.window), default=None)
+            same = next((record for record in unmatched if record.window == cut.window), None)  # as most are
+            if same is None:
+                alike = (record for record in unmatched if record.window.across == cut.window.across)
+                same = max(alike, key=lambda record: record.window.overlap(cut.window), default=None)
             if same is not None and same.window.overlap(cut.window) >= SAME_STRIP:
                 unmatched.remove(same)
                 self._strips.revise(same, cut, why)

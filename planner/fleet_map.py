@@ -33,6 +33,7 @@ class VehicleLayer:
     """What one vehicle has published, over all its starts: levels and settled cells, all of grid shape; sums of its
     starts saturate as those of one do.
 
+    `told`: the rows and columns of the grid that hold all tiles of which it has told, of a large fleet's area few.
     `versions`: of each tile, by incarnation, the newest version that has come. Memory does not grow with each start:
     of a tile of which more than MOST_STARTS starts have told, the oldest are held as one, whose version is CLOSED.
     What one of those has told counts on, and what comes of it later is not taken.
@@ -41,6 +42,7 @@ class VehicleLayer:
     sum_levels: LevelArray
     largest_levels: LevelArray
     settled: BoolArray
+    told: Window = (slice(0, 0), slice(0, 0))
     versions: dict[Place, dict[int, int]] = field(default_factory=dict)
     _apart: dict[Place, dict[int, _Told]] = field(default_factory=dict)  # where more than one start has told
 
@@ -55,6 +57,12 @@ class VehicleLayer:
 
     def take(self, place: Place, window: Window, incarnation: int, tile: ToldTile) -> bool:
         """Takes a start's tile, whose cells are the window's; returns whether it was news."""
+        if place not in self.versions:
+            rows, columns = (
+                slice(min(held.start, new.start), max(held.stop, new.stop)) if held.stop else new
+                for held, new in zip(self.told, window, strict=True)
+            )
+            self.told = rows, columns
         versions = self.versions.setdefault(place, {})
         oldest = min(versions, default=incarnation)
         if tile.version <= versions.get(incarnation, -1) or (incarnation < oldest and versions[oldest] == CLOSED):
@@ -199,8 +207,17 @@ class FleetMap:
         settled: BoolArray = np.zeros(self._unseen[window].shape, dtype=np.bool_)
         for vehicle in vehicles:
             if vehicle in self.layers:
-                settled |= self.layers[vehicle].settled[window]
+                to, its = self._shared(window, self.layers[vehicle])
+                settled[to] |= self.layers[vehicle].settled[its]
         return settled
+
+    def sums(self, window: Window, vehicles: Iterable[str]) -> NDArray[np.unsignedinteger]:
+        """Levels in a window of which these vehicles have told, summed over their looks."""
+        return self._sums(window, [self.layers[vehicle] for vehicle in vehicles])
+
+    def largest(self, window: Window) -> LevelArray:
+        """The largest single look of all at each cell of a window, in levels."""
+        return self._largest(window, self.layers.values())
 
     def risk_of_layers(self, layers: Iterable[VehicleLayer]) -> tuple[FloatArray, BoolArray]:
         """Residual risk, and which cells are seen, from these layers alone, of this map or as they once were."""
@@ -230,12 +247,29 @@ class FleetMap:
         self, window: Window, layers: Sequence[VehicleLayer]
     ) -> tuple[NDArray[np.unsignedinteger], NDArray[np.unsignedinteger]]:
         """Sums and maxima of these layers' levels; without a `rho` the sums alone count, and stand for both."""
+        sums = self._sums(window, layers)
+        return sums, sums if self.rho == 0.0 else self._largest(window, layers)
+
+    def _sums(self, window: Window, layers: Sequence[VehicleLayer]) -> NDArray[np.unsignedinteger]:
         sums = self._unseen[window].astype(np.min_scalar_type(MOST_LEVELS * len(layers)))
         for layer in layers:
-            sums += layer.sum_levels[window]
-        if self.rho == 0.0:
-            return sums, sums
+            to, its = self._shared(window, layer)
+            sums[to] += layer.sum_levels[its]
+        return sums
+
+    def _largest(self, window: Window, layers: Iterable[VehicleLayer]) -> LevelArray:
         largest = self._unseen[window].copy()
         for layer in layers:
-            np.maximum(largest, layer.largest_levels[window], out=largest)
-        return sums, largest
+            to, its = self._shared(window, layer)
+            np.maximum(largest[to], layer.largest_levels[its], out=largest[to])
+        return largest
+
+    def _shared(self, window: Window, layer: VehicleLayer) -> tuple[Window, Window]:
+        """What of a window a layer may have told of, within the window and within the map; both empty for nothing."""
+        to, its = [], []
+        for here, told, size in zip(window, layer.told, self.grid.shape, strict=True):
+            begin, end, _ = here.indices(size)
+            first, behind = max(begin, told.start), min(end, told.stop)
+            its.append(slice(first, max(first, behind)))
+            to.append(slice(first - begin, max(first, behind) - begin))
+        return (to[0], to[1]), (its[0], its[1])

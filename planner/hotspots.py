@@ -10,7 +10,7 @@ import numpy as np
 
 from planner.outline import outline as outline_of
 from planner.patches import NumberArray, carried_on
-from planner.types import BoolArray, FloatArray, GridSpec, Point, Window
+from planner.types import EVERYWHERE, BoolArray, FloatArray, GridSpec, Point, Window
 
 MOST_VERTICES = 40
 """An outline has no more."""
@@ -49,14 +49,19 @@ class _Cells:
 def blocks_about(grid: GridSpec, inside: BoolArray, block_m: float = BLOCK_M) -> Window:
     """The rows and columns of the whole blocks, see `update_hotspots`, that hold all cells `inside`, shape
     `grid.shape`; none where there is no such cell."""
-    if not inside.any():
-        return slice(0, 0), slice(0, 0)
-    block = _cells_a_block(grid, block_m)
-    rows, columns = (np.flatnonzero(inside.any(axis=axis)) // block * block for axis in (1, 0))
+    block, (rows, columns) = _cells_a_block(grid, block_m), window_about(inside)
     return (
-        slice(int(rows[0]), min(int(rows[-1]) + block, grid.rows)),
-        slice(int(columns[0]), min(int(columns[-1]) + block, grid.columns)),
+        slice(rows.start // block * block, min(-(-rows.stop // block) * block, grid.rows)),
+        slice(columns.start // block * block, min(-(-columns.stop // block) * block, grid.columns)),
     )
+
+
+def window_about(cells: BoolArray) -> Window:
+    """The rows and columns that hold all of some cells; none where there is no such cell."""
+    rows, columns = (np.flatnonzero(cells.any(axis=axis)) for axis in (1, 0))
+    if not rows.size:
+        return slice(0, 0), slice(0, 0)
+    return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
 
 
 def _cells_a_block(grid: GridSpec, block_m: float) -> int:
@@ -106,6 +111,7 @@ def update_hotspots(
     risk: FloatArray,
     previous: HotspotMap,
     *,
+    part: Window = EVERYWHERE,
     block_m: float = BLOCK_M,
     least_area_m2: float = 400.0,
 ) -> HotspotUpdate:
@@ -123,6 +129,8 @@ def update_hotspots(
         unsettled: the cells inside that are not settled, same shape.
         risk: residual risk, same shape.
         previous: what the last update gave, or `HotspotMap.empty`.
+        part: rows and columns of the window that hold all cells of which any of that is another than in the last
+            update.
         block_m: side of the square blocks, counted in whole cells from the window's first, > 0.
         least_area_m2: smaller patches are left out.
 
@@ -140,18 +148,16 @@ def update_hotspots(
     if not 0 < block_m < np.inf:
         raise ValueError(f"a block's side must be finite and above 0, not {block_m} m")
     block, least_area_m2 = _cells_a_block(grid, block_m), float(least_area_m2)
-    cells = _Cells(
-        np.array(risk, dtype=np.float64, order="C"), np.zeros(hot.shape, dtype=np.bool_), block, least_area_m2
-    )
-    before = previous.made_of
+    before, looked_at = previous.made_of, _bounds(part, hot.shape)
     if before is None or (before.block, before.least_area_m2) != (block, least_area_m2):
-        before = _Cells(np.full(hot.shape, np.nan), cells.growing, block, least_area_m2)  # which nothing is like
+        nothing = np.full(hot.shape, np.nan), np.zeros(hot.shape, dtype=np.bool_)  # which nothing is like
+        before, looked_at = _Cells(*nothing, block, least_area_m2), _bounds(EVERYWHERE, hot.shape)
     # No patch reaches from one block into another, so that where nothing is new they are what they were.
     found = carried_on(
-        np.array(hot, order="C"),
-        np.array(unsettled, order="C"),
-        cells.risk,
-        cells.growing,
+        np.ascontiguousarray(hot),
+        np.ascontiguousarray(unsettled),
+        np.ascontiguousarray(risk, dtype=np.float64),
+        looked_at,
         before.risk,
         before.growing,
         previous.numbers,
@@ -177,12 +183,21 @@ def update_hotspots(
         told[number] = Hotspot(number, outline, round(risk_sum / size, 4), size, growing)
     withdrawn = {number: heir or None for number, heir in zip(found.gone.tolist(), found.heirs.tolist(), strict=True)}
     changed = [now for now in told.values() if now != previous.hotspots.get(now.number)]
+    made_of = _Cells(found.risk, found.growing, block, least_area_m2)
     hotspots = {number: one for number, one in previous.hotspots.items() if number not in withdrawn} | told
     return HotspotUpdate(
-        HotspotMap(previous.window, found.numbers, MappingProxyType(hotspots), found.next_number, cells),
+        HotspotMap(previous.window, found.numbers, MappingProxyType(hotspots), found.next_number, made_of),
         tuple(sorted(changed, key=lambda hotspot: hotspot.number)),
         withdrawn,
     )
+
+
+def _bounds(window: Window, shape: tuple[int, ...]) -> tuple[int, int, int, int]:
+    """A window's first row, the one behind its last, and so of columns."""
+    (first_row, end_row, _), (first_column, end_column, _) = (
+        one.indices(size) for one, size in zip(window, shape, strict=True)
+    )
+    return first_row, end_row, first_column, end_column
 
 
 def _outline(

@@ -26,7 +26,8 @@ class Carried(NamedTuple):
     `is_growing`: whether any of these is, `is_reshaped`: whether the number had others before, and `bounds`: the first
     row, the one behind the last, and so of columns, counted from the window's. `gone`: the numbers there that no patch
     carries on, in the order of their first cells, row by row; `heirs`: of each the number that now has most of its
-    cells, of equals the lowest, 0 for none.
+    cells, of equals the lowest, 0 for none. Of all of the map's cells: `risk`, NOT_HOT where they are not hot, and
+    `growing`: which hot ones touch an unsettled one by a side.
     """
 
     window: tuple[int, int, int, int]
@@ -42,6 +43,8 @@ class Carried(NamedTuple):
     bounds: IntArray
     gone: IntArray
     heirs: IntArray
+    risk: FloatArray
+    growing: BoolArray
 
 
 @compiled
@@ -49,7 +52,7 @@ def carried_on(
     hot: BoolArray,
     unsettled: BoolArray,
     risk: FloatArray,
-    growing: BoolArray,
+    part: tuple[int, int, int, int],
     risk_before: FloatArray,
     growing_before: BoolArray,
     before: NumberArray,
@@ -62,18 +65,18 @@ def carried_on(
     Args:
         hot: the cells of which there are patches.
         unsettled: the cells that may come to be hot.
-        risk: residual risk; becomes NOT_HOT where cells are not.
-        growing: without any; marked are the hot cells that touch an unsettled one by a side.
-        risk_before: what came of `risk` the last time.
-        growing_before: what came of `growing` then.
+        risk: residual risk.
+        part: where any of these three may be another than the last time: the first row, the one behind the last, and so
+            of columns. Of other cells only those that touch these are looked at.
+        risk_before: what came of `risk` then; NaN for what is to count as new.
+        growing_before: what `growing` was then.
         before: the number of each cell then, 0 for none.
         next_number: the next new one, above all of these.
         block: patches end at the borders of blocks of so many rows and columns, >= 1.
         areas_m2: of a cell, and of the smallest patch that counts.
     """
-    first_row, last_row, first_column, last_column = _compared(
-        hot, unsettled, risk, growing, risk_before, growing_before
-    )
+    risk_now, growing = risk_before.copy(), growing_before.copy()
+    first_row, last_row, first_column, last_column = _compared(hot, unsettled, risk, part, risk_now, growing)
     begin = first_row // block * block, first_column // block * block
     rows = min(last_row // block * block + block, hot.shape[0]) - begin[0]
     columns = min(last_column // block * block + block, hot.shape[1]) - begin[1]
@@ -161,6 +164,8 @@ def carried_on(
         bounds,
         gone[:count_gone],
         heirs[:count_gone],
+        risk_now,
+        growing,
     )
 
 
@@ -197,29 +202,27 @@ def _compared(
     hot: BoolArray,
     unsettled: BoolArray,
     risk: FloatArray,
+    part: tuple[int, int, int, int],
+    risk_now: FloatArray,
     growing: BoolArray,
-    risk_before: FloatArray,
-    growing_before: BoolArray,
 ) -> tuple[int, int, int, int]:
-    """Marks in the risk which cells are not hot, and which of those that are touch an unsettled one by a side, as
-    growing; returns the first and last row and column in which either is another than before, the last row -1 if none.
-
-    All of one shape, (rows, columns); `growing` comes without any.
-    """
+    """Brings the last two, which come as they were, up to date, see `Carried`; returns the first and last row and
+    column in which either has become another, the last row -1 if none. All of one shape; `part`: see `carried_on`."""
     rows, columns = hot.shape
     first_row, last_row, first_column, last_column = rows, -1, columns, -1
-    for row in range(rows):
-        for column in range(columns):
-            if not hot[row, column]:
-                risk[row, column] = NOT_HOT
-            elif (
-                (row > 0 and unsettled[row - 1, column])
-                or (row + 1 < rows and unsettled[row + 1, column])
-                or (column > 0 and unsettled[row, column - 1])
-                or (column + 1 < columns and unsettled[row, column + 1])
-            ):
-                growing[row, column] = True
-            if risk[row, column] != risk_before[row, column] or growing[row, column] != growing_before[row, column]:
+    for row in range(max(part[0] - 1, 0), min(part[1] + 1, rows)):
+        for column in range(max(part[2] - 1, 0), min(part[3] + 1, columns)):
+            is_hot = hot[row, column]
+            its_risk, grows = risk[row, column] if is_hot else NOT_HOT, False
+            if is_hot:
+                grows = (
+                    (row > 0 and unsettled[row - 1, column])
+                    or (row + 1 < rows and unsettled[row + 1, column])
+                    or (column > 0 and unsettled[row, column - 1])
+                    or (column + 1 < columns and unsettled[row, column + 1])
+                )
+            if its_risk != risk_now[row, column] or grows != growing[row, column]:
+                risk_now[row, column], growing[row, column] = its_risk, grows
                 first_row, last_row = min(first_row, row), row
                 first_column, last_column = min(first_column, column), max(last_column, column)
     return first_row, last_row, first_column, last_column
@@ -271,18 +274,9 @@ def _first(leader: IntArray, place: int) -> int:
     return place
 
 
-def _map_of_one() -> tuple[FloatArray, BoolArray]:
-    return np.ones((1, 1)), np.ones((1, 1), dtype=np.bool_)
+def _sample() -> tuple[object, ...]:
+    cells, risk = np.ones((1, 1), dtype=np.bool_), np.ones((1, 1))
+    return cells, cells, risk, (0, 1, 0, 1), risk, cells, np.ones((1, 1), dtype=np.int32), 2, 1, (1.0, 1.0)
 
 
-carried_on.called_with(
-    lambda: (
-        *np.ones((2, 1, 1), dtype=np.bool_),
-        *_map_of_one(),
-        *_map_of_one(),
-        np.ones((1, 1), dtype=np.int32),
-        2,
-        1,
-        (1.0, 1.0),
-    )
-)
+carried_on.called_with(_sample)

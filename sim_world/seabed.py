@@ -7,11 +7,12 @@ units of its half axes; inside, its weight is (1 - q)^2, 1 at the centre and 0 w
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, fields, replace
 
 import numpy as np
 
 from comms.node import random_stream
+from planner.compiled import compiled
 from planner.types import FloatArray, Point
 from sim_world.area import Ground
 from sim_world.config import SeabedConfig
@@ -47,29 +48,16 @@ class PatchySeabed:
 
     def __init__(self, patches: tuple[Patch, ...]) -> None:
         self.patches = patches
-        self._x_m = np.array([patch.x_m for patch in patches])
-        self._y_m = np.array([patch.y_m for patch in patches])
-        self._reach_m = np.array([max(patch.half_length_m, patch.half_width_m) for patch in patches])
+        rows = [[math.nan if one is None else one for one in astuple(patch)] for patch in patches]
+        self._rows = np.array(rows, dtype=np.float64).reshape(len(patches), len(fields(Patch)))
 
     def factor(self, x_m: FloatArray, y_m: FloatArray, bearing_rad: FloatArray | float) -> FloatArray:
         """The factors, in the arguments' common shape."""
-        factor = np.ones(np.broadcast(x_m, y_m, bearing_rad).shape)
-        if factor.size:
-            for number in self._near(x_m, y_m):
-                patch = self.patches[number]
-                taken = patch.strength * _weight(patch, x_m, y_m)
-                if patch.ripple_normal_rad is not None:
-                    taken = taken * np.cos(bearing_rad - patch.ripple_normal_rad) ** 2
-                factor *= 1.0 - taken
-        return factor
-
-    def _near(self, x_m: FloatArray, y_m: FloatArray) -> list[int]:
-        # Few patches reach the bounding box of a look; the others are left out before anything is worked out by point.
-        x_low, x_high, y_low, y_high = np.min(x_m), np.max(x_m), np.min(y_m), np.max(y_m)
-        dx = self._x_m - np.clip(self._x_m, x_low, x_high)
-        dy = self._y_m - np.clip(self._y_m, y_low, y_high)
-        found: list[int] = np.flatnonzero(dx * dx + dy * dy < self._reach_m**2).tolist()
-        return found
+        shape = np.broadcast(x_m, y_m, bearing_rad).shape
+        x_m, y_m, bearing_rad = (
+            np.array(np.broadcast_to(one, shape), np.float64).ravel() for one in (x_m, y_m, bearing_rad)
+        )
+        return _factor(x_m, y_m, bearing_rad, self._rows).reshape(shape)
 
 
 def make_seabed(config: SeabedConfig, area: tuple[Point, ...], seed: int) -> Seabed:
@@ -105,9 +93,31 @@ def _draw(
     return tuple(Patch(*row) for row in rows.tolist())
 
 
-def _weight(patch: Patch, x_m: FloatArray, y_m: FloatArray) -> FloatArray:
-    sin, cos = math.sin(patch.heading_rad), math.cos(patch.heading_rad)
-    dx, dy = x_m - patch.x_m, y_m - patch.y_m
-    along = dx * (sin / patch.half_length_m) + dy * (cos / patch.half_length_m)
-    across = dx * (cos / patch.half_width_m) - dy * (sin / patch.half_width_m)
-    return np.maximum(1.0 - along * along - across * across, 0.0) ** 2
+@compiled
+def _factor(x_m: FloatArray, y_m: FloatArray, bearing_rad: FloatArray, patches: FloatArray) -> FloatArray:
+    """What patches leave at points; `patches`: the fields of each, shape (patches, 7)."""
+    factor = np.ones(x_m.size)
+    if not x_m.size:
+        return factor
+    x_low_m, x_high_m, y_low_m, y_high_m = x_m.min(), x_m.max(), y_m.min(), y_m.max()
+    for patch in range(len(patches)):
+        its_x_m, its_y_m, heading_rad, half_length_m, half_width_m, strength, normal_rad = patches[patch]
+        # Few patches reach the box that holds all points; the others are left out before anything is worked out.
+        beside_m = max(x_low_m - its_x_m, its_x_m - x_high_m, 0.0), max(y_low_m - its_y_m, its_y_m - y_high_m, 0.0)
+        if beside_m[0] ** 2 + beside_m[1] ** 2 >= max(half_length_m, half_width_m) ** 2:
+            continue
+        sin, cos = math.sin(heading_rad), math.cos(heading_rad)
+        for point in range(x_m.size):
+            dx_m, dy_m = x_m[point] - its_x_m, y_m[point] - its_y_m
+            along = dx_m * (sin / half_length_m) + dy_m * (cos / half_length_m)
+            across = dx_m * (cos / half_width_m) - dy_m * (sin / half_width_m)
+            within = 1.0 - along * along - across * across
+            if within > 0.0:
+                taken = strength * within**2
+                if not math.isnan(normal_rad):
+                    taken *= math.cos(bearing_rad[point] - normal_rad) ** 2
+                factor[point] *= 1.0 - taken
+    return factor
+
+
+_factor.called_with(lambda: (*np.ones((3, 1)), np.ones((1, 7))))

@@ -11,7 +11,7 @@ from comms.said.topics import COVERAGE
 from planner.footprints.cells import look_on_grid, over_cells
 from planner.risk import RiskLayer
 from planner.tiles import Tile, tiles, tiles_about, tiles_holding, tiles_within
-from planner.types import BoolArray, GridSpec, Strip
+from planner.types import BoolArray, GridSpec, Strip, Window
 
 MOST_AGAIN = 200  # tiles that are said again at one time, as somebody asks
 OFTEN_ENOUGH = 8  # times that a tile is said: where a fifth of all words is lost, 3 of 1,000,000 tiles stay unheard
@@ -24,7 +24,8 @@ class CoverageLayer:
     and of noisy estimates the best is better by luck: there the noise of single bins is taken out first, by the mean
     over those on a cell. With independent looks the noise does no harm: on average their product is right.
 
-    `settled`: the cells that are, shape `grid.shape`; to be replaced by another array, not changed in place.
+    `settled`: the cells that are, shape `grid.shape`; to be replaced by another array, not changed in place. `newest`:
+    the rows and columns of the grid that the last look may have seen.
     """
 
     def __init__(self, vehicle: str, grid: GridSpec, rho: float = 0.0) -> None:
@@ -32,6 +33,7 @@ class CoverageLayer:
         self._best_counts = rho > 0.0
         self.layer = RiskLayer(grid)
         self.settled: BoolArray = np.zeros(grid.shape, dtype=np.bool_)
+        self.newest: Window = slice(0, 0), slice(0, 0)
         self._vehicle = vehicle
         self._version = 0
         self._versions_told = 0  # the sum of the newest of all tiles
@@ -48,6 +50,7 @@ class CoverageLayer:
         rows, columns, p_detect = look_on_grid(self.grid, look.geometry, p_detect)
         self.layer.add_look(rows, columns, p_detect)
         self._looked_at.update(tiles_within(self.grid, self._tiles, rows, columns))
+        self.newest = rows, columns
 
     def changed_tiles(self) -> list[Publication]:
         """The tiles that differ from what was last published."""

@@ -29,7 +29,7 @@ from planner.first_plan import parts_in_order
 from planner.flyable import flyable_pieces
 from planner.footprints.cells import Ahead, cells_within, settled_cells
 from planner.footprints.footprint import Reach
-from planner.hotspots import HotspotMap, blocks_about, update_hotspots
+from planner.hotspots import HotspotMap, blocks_about, update_hotspots, window_about
 from planner.profile_spacing import Known, SpacingTerms, known_before
 from planner.risk import HIGHEST_P_DETECT, residual_risk
 from planner.spacing_planners import SpacingDecision
@@ -75,7 +75,7 @@ class SurveyAgent(Agent):
         self._hotspots: HotspotMap
         self._hotspots_said: dict[int, Hotspot] = {}
         self._hotspots_due_ms = 0
-        self._new_looks = False
+        self._looked_at = list[Window]()  # of the grid, since hotspots were looked for last
 
     def on_run(self, run: RunInfo, now_ms: int) -> None:
         """Lays the first tracks and begins."""
@@ -85,7 +85,10 @@ class SurveyAgent(Agent):
             region = region.share(*self.config.share, self._grid.frame.heading_rad)
         self._inside = region.inside(self._grid)
         self._rho = run.rho
-        self._hotspots = HotspotMap.empty(self._grid, blocks_about(self._grid, self._inside))
+        window = blocks_about(self._grid, self._inside)
+        self._hotspots = HotspotMap.empty(self._grid, window)
+        inside = self._inside[window]
+        self._hot, self._unsettled, self._risk = np.zeros_like(inside), inside.copy(), np.ones(inside.shape)
         if self.config.prior is not None:
             self._publish_prior(self.config.prior)
         sonar, begin = (self.config.nadir_gap_m, self.config.range_m), self.config.begin
@@ -100,7 +103,8 @@ class SurveyAgent(Agent):
 
     def on_look(self, look: Look, now_ms: int) -> None:
         """Notes how far the sonar sees; of a look at the present track also its P_d and how far the track is looked."""
-        self._new_looks = True
+        assert self.coverage is not None
+        self._looked_at.append(self.coverage.newest)
         self._along_bin_m = max(self._along_bin_m, look.along_bin_m)
         reach = Reach.of_look(look.geometry, look.p_detect)
         if reach is not None:
@@ -160,7 +164,7 @@ class SurveyAgent(Agent):
 
     def report(self, now_ms: int) -> None:
         """Looks for hotspots every 30 s, before the tiles go out, so that both tell the same."""
-        if self._new_looks and now_ms >= self._hotspots_due_ms:
+        if self._looked_at and now_ms >= self._hotspots_due_ms:
             self._find_hotspots(now_ms)
         super().report(now_ms)
 
@@ -379,14 +383,18 @@ class SurveyAgent(Agent):
 
     def _find_hotspots(self, now_ms: int) -> None:
         assert self.coverage is not None
-        self._new_looks = False
         self._hotspots_due_ms = now_ms + HOTSPOTS_EVERY_MS
+        settled_before = self.coverage.settled
         self._settle()
-        layer, window = self.coverage.layer, self._hotspots.window
-        settled = self.coverage.settled[window]
-        risk = residual_risk(layer.sum_levels[window], layer.largest_levels[window], self._rho)
-        hot = settled & (risk >= self.config.hotspot_risk)
-        update = update_hotspots(self._grid, hot, self._inside[window] & ~settled, risk, self._hotspots)
+        changed, window = self.coverage.settled != settled_before, self._hotspots.window
+        for seen in self._looked_at:
+            changed[seen] = True
+        self._looked_at.clear()
+        part, layer, settled = window_about(changed[window]), self.coverage.layer, self.coverage.settled[window]
+        risk = residual_risk(layer.sum_levels[window][part], layer.largest_levels[window][part], self._rho)
+        self._risk[part], self._hot[part] = risk, settled[part] & (risk >= self.config.hotspot_risk)
+        self._unsettled[part] = self._inside[window][part] & ~settled[part]
+        update = update_hotspots(self._grid, self._hot, self._unsettled, self._risk, self._hotspots, part=part)
         self._hotspots = update.map
         for hotspot in update.changed:
             outline = tuple(Vertex(x_m, y_m) for x_m, y_m in hotspot.outline)

@@ -104,7 +104,7 @@ def _search(team: Found, plans: Plans, ahead: Ahead, beam: int) -> IntArray:
     the first plan."""
     heirs, begins = np.full(plans.gained_m2.size, NONE), np.zeros(plans.gained_m2.size + 1, np.int64)
     turn, begins[1] = begins[0], 1  # a 0 of the array's type: for a plain one what it is given to is compiled once more
-    spare, ahead_of_spare = _plan(plans, plans.gained_m2.size - 1), _ahead(ahead, turn)
+    spare = _plan(plans, plans.gained_m2.size - 1)
     while begins[turn] < begins[turn + 1]:
         begins[turn + 2] = _grow(team, plans, begins[turn], begins[turn + 1], ahead, beam, turn, heirs)
         turn += 1
@@ -114,7 +114,7 @@ def _search(team: Found, plans: Plans, ahead: Ahead, beam: int) -> IntArray:
         for plan in range(begins[turn], begins[turn + 1]):
             if heirs[plan] == NONE:
                 _copy(_plan(plans, plan), spare)
-                _complete(team, spare, ahead_of_spare, turn)
+                _complete(team, spare, turn)
                 counts_m2[plan] = _counts_m2(team, spare)
             else:
                 counts_m2[plan] = counts_m2[heirs[plan]]
@@ -125,11 +125,11 @@ def _search(team: Found, plans: Plans, ahead: Ahead, beam: int) -> IntArray:
             best, best_turn = one, turn
         turn += 1
     _copy(_plan(plans, best), spare)
-    turn = _complete(team, spare, ahead_of_spare, best_turn)
+    turn = _complete(team, spare, best_turn)
     if spare.is_done.size > 1:  # who had left the rest to others takes what those leave
         for one in range(spare.is_done.size):
             spare.is_done[one] = False
-        _complete(team, spare, ahead_of_spare, turn)
+        _complete(team, spare, turn)
     return spare.turn
 
 
@@ -192,7 +192,7 @@ def _grow(team: Found, plans: Plans, first: int, end: int, ahead: Ahead, beam: i
         if strip == strips:
             plan.is_done[nexts[row]] = True
         else:
-            _serve(team, plan, nexts[row], strip, its_ahead, turn)
+            _serve(team, plan, nexts[row], strip, its_ahead.ends_s[strip], its_ahead.gained_m2[strip], turn)
         other = end
         while other < grown and not _are_alike(plan, _plan(plans, other)):
             other += 1
@@ -206,14 +206,40 @@ def _grow(team: Found, plans: Plans, first: int, end: int, ahead: Ahead, beam: i
 
 
 @compiled
-def _complete(team: Found, plan: Plans, ahead: Ahead, turn: int) -> int:
+def _complete(team: Found, plan: Plans, turn: int) -> int:
     """Goes on with a plan by what brings most a second, until nothing can be gained any more; returns which turn would
     be next."""
-    one = _next(team, plan, ahead)
+    one, strips = _first_free(plan), team.rank.size
     while one != NONE:
-        _serve(team, plan, one, _most_a_second(ahead), ahead, turn)
-        one, turn = _next(team, plan, ahead), turn + 1
+        best, best_m2ps, ends_s, brings_m2 = strips, 0.0, 0.0, 0.0  # none of them yet
+        for strip in range(strips):
+            if plan.turn[strip] == NONE:
+                free_s, spent_s, gained_m2 = _gone_on(team, plan, one, strip)
+                rate_m2ps = _rate_m2ps(spent_s, gained_m2)
+                if rate_m2ps > best_m2ps:
+                    best, best_m2ps, ends_s, brings_m2 = strip, rate_m2ps, free_s, gained_m2
+        if best == strips:
+            plan.is_done[one] = True
+        else:
+            _serve(team, plan, one, best, ends_s, brings_m2, turn)
+            turn += 1
+        one = _first_free(plan)
     return turn
+
+
+@compiled
+def _gone_on(team: Found, plan: Plans, one: int, strip: int) -> tuple[float, float, float]:
+    """What comes of it if a helper goes on with a strip, see `Ahead`."""
+    free_s, found = plan.free_s[one], team.table[one, plan.node[one]]
+    begins_s, sweep_s = found[0, strip] + free_s, found[1, strip]
+    ends_s = begins_s + sweep_s
+    if not found[2, strip] + ends_s <= team.lasts_s[one]:
+        return ends_s, 0.0, 0.0
+    ends_free_s = ends_s + team.run_out_s[one]
+    spent_s = min(ends_free_s, team.deadline_s) - free_s
+    share = min(max((team.deadline_s - begins_s) / sweep_s, 0.0), 1.0)
+    gained_m2 = share * found[3, strip] - spent_s * team.time_m2ps[one]
+    return ends_free_s, spent_s, gained_m2 if gained_m2 > 0.0 else 0.0
 
 
 @compiled
@@ -239,17 +265,12 @@ def _first_free(plan: Plans) -> int:
 @compiled
 def _finds(team: Found, plan: Plans, one: int, ahead: Ahead) -> bool:
     """Whether a helper finds anything to go on with; what, stands in `ahead`."""
-    free_s, found, finds_any = plan.free_s[one], team.table[one, plan.node[one]], False
+    finds_any = False
     for strip in range(team.rank.size):
-        begins_s, sweep_s = found[0, strip] + free_s, found[1, strip]
-        ends_s = begins_s + sweep_s
-        may = plan.turn[strip] == NONE and found[2, strip] + ends_s <= team.lasts_s[one]
-        ahead.ends_s[strip] = ends_s + team.run_out_s[one]
-        ahead.spent_s[strip] = min(ahead.ends_s[strip], team.deadline_s) - free_s
-        share = min(max((team.deadline_s - begins_s) / sweep_s, 0.0), 1.0)
-        gained_m2 = share * found[3, strip] - ahead.spent_s[strip] * team.time_m2ps[one]
-        ahead.gained_m2[strip] = gained_m2 if may and gained_m2 > 0.0 else 0.0
-        finds_any |= ahead.gained_m2[strip] > 0.0
+        ahead.gained_m2[strip] = 0.0
+        if plan.turn[strip] == NONE:
+            ahead.ends_s[strip], ahead.spent_s[strip], ahead.gained_m2[strip] = _gone_on(team, plan, one, strip)
+            finds_any |= ahead.gained_m2[strip] > 0.0
     return finds_any
 
 
@@ -258,19 +279,25 @@ def _most_a_second(ahead: Ahead) -> int:
     """The strip that brings most a second."""
     best, most_m2ps = 0, 0.0
     for strip in range(ahead.gained_m2.size):
-        rate_m2ps = ahead.gained_m2[strip] / max(ahead.spent_s[strip], LEAST_S)
+        rate_m2ps = _rate_m2ps(ahead.spent_s[strip], ahead.gained_m2[strip])
         if rate_m2ps > most_m2ps:
             best, most_m2ps = strip, rate_m2ps
     return best
 
 
 @compiled
-def _serve(team: Found, plan: Plans, one: int, strip: int, ahead: Ahead, turn: int) -> None:
-    """A helper serves a strip, as the `turn`th of its plan."""
+def _rate_m2ps(spent_s: float, gained_m2: float) -> float:
+    """What is gained a second; no time at all counts as a little."""
+    return gained_m2 / max(spent_s, LEAST_S)
+
+
+@compiled
+def _serve(team: Found, plan: Plans, one: int, strip: int, ends_s: float, gained_m2: float, turn: int) -> None:
+    """A helper serves a strip, as the `turn`th of its plan, and is free again when it ends."""
     plan.node[one] = team.way[one, plan.node[one], strip]
-    plan.free_s[one] = ahead.ends_s[strip]
+    plan.free_s[one] = ends_s
     plan.turn[strip] = turn * team.free_s.size + one
-    plan.gained_m2[0] += ahead.gained_m2[strip]
+    plan.gained_m2[0] += gained_m2
 
 
 @compiled

@@ -17,7 +17,6 @@ from coordinator.expect.hotspots import Hotspots
 from coordinator.expect.seabed import Seabed
 from coordinator.expect.tracks import ExpectedTracks
 from coordinator.fleet import KnownFleet
-from planner.compiled import compiled
 from planner.risk import HIGHEST_P_DETECT, MOST_LEVELS, NATS_PER_LEVEL, LevelArray
 from planner.rounding import rounded
 from planner.types import BoolArray, FloatArray
@@ -63,53 +62,31 @@ class ExpectedMap:
     def now(self) -> Expectation:
         """What is expected by all that was heard. Ground ahead of the survey is told of once every primary that
         surveys has said its plan."""
-        fleet, rho = self._fleet, self._fleet.map.rho
+        fleet, rho, cells = self._fleet, self._fleet.map.rho, self._place.cells
         tracks = self._tracks.of(fleet.primaries)
-        primaries, helpers, largest_levels = self._told_so_far()
-        share, helpers_share = self._seabed.shares(primaries, tracks.flown)
-        nats = primaries + helpers + share * tracks.ahead
+        told = self._told(surveys=True)
+        share, helpers_share = self._seabed.shares(told, tracks.flown)
+        told += self._told(surveys=False)
+        nats = np.multiply(share, tracks.ahead)
+        nats += told
         look = np.minimum(self._p_detect * helpers_share, HIGHEST_P_DETECT)
         if rho > 0:  # the largest single look counts for more, and of another what it adds to that
-            largest = np.maximum(NATS_PER_LEVEL * largest_levels, share * tracks.largest_ahead)
+            largest = np.maximum(NATS_PER_LEVEL * fleet.map.largest(cells), share * tracks.largest_ahead)
             nats = largest * rho + nats * (1 - rho)
             look_nats = -np.log1p(-look)
             look = -np.expm1(-np.maximum(look_nats - largest, 0.0) * rho - look_nats * (1 - rho))
-        settled = fleet.map.settled_by(fleet.primaries, self._place.cells)
+        settled = fleet.map.settled_by(fleet.primaries, cells)
         hot, told_risk = self.hotspots.drawn()
-        has_tiles = settled | (primaries + helpers > 0)
-        risk = np.where(hot & ~has_tiles, told_risk, rounded(np.exp(-nats)))
+        risk = rounded(np.exp(np.negative(nats, out=nats), out=nats))
+        np.copyto(risk, told_risk, where=hot & ~(settled | (told > 0)))
         is_seen = settled | hot
         plans_are_known = all(one.plan is not None for one in fleet.primaries.values())
-        return Expectation(
-            risk=np.where(self._inside & (is_seen | plans_are_known), risk, 0.0),
-            look=rounded(look),
-            is_seen=is_seen,
-        )
+        risk *= self._inside if plans_are_known else self._inside & is_seen
+        return Expectation(risk=risk, look=rounded(look), is_seen=is_seen)
 
-    def _told_so_far(self) -> tuple[FloatArray, FloatArray, LevelArray]:
-        """-ln(1 - P_d) of all looks so far, summed over those of primaries and of helpers, and the level of the largest
-        of all."""
-        shape, cells = self.grid.shape, self._place.cells
-        primaries, helpers = np.zeros((2, *shape))
-        largest_levels = np.zeros(shape, dtype=np.uint8)
-        for name, layer in self._fleet.map.layers.items():
-            levels = np.ascontiguousarray(layer.sum_levels[cells])
-            if levels.any():  # most of a large fleet's are elsewhere
-                nats = primaries if name in self._fleet.primaries else helpers
-                largest = np.ascontiguousarray(layer.largest_levels[cells])
-                _add(nats, largest_levels, levels, largest, NATS_PER_LEVEL)
-        return primaries, helpers, largest_levels
-
-
-@compiled
-def _add(
-    nats: FloatArray, largest_levels: LevelArray, levels: LevelArray, its_largest: LevelArray, nats_a_level: float
-) -> None:
-    """Adds what one vehicle has seen to a sum, and to the largest single look."""
-    for row in range(levels.shape[0]):
-        for column in range(levels.shape[1]):
-            nats[row, column] += levels[row, column] * nats_a_level
-            largest_levels[row, column] = max(largest_levels[row, column], its_largest[row, column])
-
-
-_add.called_with(lambda: (np.zeros((1, 1)), *np.zeros((3, 1, 1), dtype=np.uint8), 1.0))
+    def _told(self, *, surveys: bool) -> FloatArray:
+        """-ln(1 - P_d) of all looks so far, summed over those of primaries, or of who does not survey."""
+        map_, primaries = self._fleet.map, self._fleet.primaries
+        vehicles = [name for name in map_.layers if (name in primaries) == surveys]
+        nats: FloatArray = map_.sums(self._place.cells, vehicles) * np.float64(NATS_PER_LEVEL)
+        return nats

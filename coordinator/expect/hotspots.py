@@ -9,7 +9,7 @@ import numpy as np
 from comms.said.messages import Hotspot, HotspotState
 from planner.fleet_map import MOST_STARTS
 from planner.region import points_inside
-from planner.types import BoolArray, FloatArray, GridSpec
+from planner.types import BoolArray, FloatArray, GridSpec, Window
 
 Place = tuple[str, int]
 """A hotspot's vehicle and number."""
@@ -21,7 +21,7 @@ Revision = tuple[int, int]
 class _Standing:
     revision: int
     mean_risk: float
-    window: tuple[slice, slice]
+    window: Window
     cells: BoolArray
 
 
@@ -37,7 +37,7 @@ class Hotspots:
         self._inside = inside
         self._starts: dict[str, dict[int, dict[int, _Standing]]] = {}  # by vehicle, incarnation and number
         self._closed: dict[str, int] = {}  # of each vehicle the newest incarnation that nothing is heard of any more
-        self._is_new = False
+        self._changed = list[Window]()  # windows of the grid that are not drawn yet as hotspots are now
         self._hot: BoolArray = np.zeros(grid.shape, dtype=np.bool_)
         self._told_risk: FloatArray = np.zeros(grid.shape)
         self._risk_of_closed: FloatArray = np.zeros(grid.shape)
@@ -54,30 +54,33 @@ class Hotspots:
         if message.state is HotspotState.ACTIVE and len(message.outline) >= 3:
             window, cells = self._cells_within([(corner.x_m, corner.y_m) for corner in message.outline])
         starts.setdefault(incarnation, {})[number] = _Standing(its_revision, message.mean_risk, window, cells)
+        self._changed += [window] if known is None else [known.window, window]
         if len(starts) > MOST_STARTS:
             oldest = self._closed[vehicle] = min(starts)
             for one in starts.pop(oldest).values():
                 _draw(one, self._hot_of_closed, self._risk_of_closed)
-        self._is_new = True
         return True
 
     def drawn(self) -> tuple[BoolArray, FloatArray]:
         """Which cells hotspots hold, and the worst mean risk told of each, 0 elsewhere; grid shape."""
-        if self._is_new:
+        if self._changed:
             self._draw()
         return self._hot, self._told_risk
 
     def _draw(self) -> None:
-        """Draws all hotspots afresh: which cells they hold, and the worst mean told of each cell."""
-        self._is_new = False
-        self._hot[:] = self._hot_of_closed
-        self._told_risk[:] = self._risk_of_closed
+        """Draws afresh what has changed, and the hotspots that lie there: what they hold, and the worst mean told of
+        each cell."""
+        changed, self._changed = self._changed, []
+        for window in changed:
+            self._hot[window] = self._hot_of_closed[window]
+            self._told_risk[window] = self._risk_of_closed[window]
         for starts in self._starts.values():
             for hotspots in starts.values():
                 for one in hotspots.values():
-                    _draw(one, self._hot, self._told_risk)
+                    if any(_overlap(one.window, window) for window in changed):
+                        _draw(one, self._hot, self._told_risk)
 
-    def _cells_within(self, outline: list[tuple[float, float]]) -> tuple[tuple[slice, slice], BoolArray]:
+    def _cells_within(self, outline: list[tuple[float, float]]) -> tuple[Window, BoolArray]:
         """The cells inside the area whose centres lie in an outline, and the window of the grid that they fill."""
         grid = self._grid
         corners = np.asarray(outline)
@@ -92,6 +95,14 @@ class Hotspots:
 def _draw(one: _Standing, hot: BoolArray, told_risk: FloatArray) -> None:
     hot[one.window] |= one.cells
     np.maximum(told_risk[one.window], one.mean_risk, out=told_risk[one.window], where=one.cells)
+
+
+def _overlap(one: Window, other: Window) -> bool:
+    """Whether two windows share cells."""
+    (rows, columns), (its_rows, its_columns) = one, other
+    if rows.stop <= its_rows.start or its_rows.stop <= rows.start:
+        return False
+    return bool(columns.start < its_columns.stop and its_columns.start < columns.stop)
 
 
 def _from_first_to_last(centres_m: FloatArray, corners_m: FloatArray) -> slice:

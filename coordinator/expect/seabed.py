@@ -49,15 +49,19 @@ class Seabed:
         `found_nats`, `expected_nats`: -ln(1 - P_d) of all looks of the primaries, as they told and as their P(y) let
         expect.
         """
-        expected = -np.expm1(-expected_nats)
-        found = np.where(expected_nats > 0, -np.expm1(-found_nats), 0.0)
-        found_about, told_about = self._about(found), self._about(expected)
-        told = float((self._told * ((found_about + DOUBT) / (told_about + DOUBT))).sum())
-        doubt = DOUBT_OF_HELPERS * self._found.size
-        of_helpers = (float(self._found.sum()) + doubt) / (told + doubt)
+        told_about = self._about(-np.expm1(-expected_nats))
+        found_about = self._about(-np.expm1(-found_nats * (expected_nats > 0)))
+        of_helpers = 1.0
+        if self._told.any():
+            told = float((self._told * ((found_about + DOUBT) / (told_about + DOUBT))).sum())
+            doubt = DOUBT_OF_HELPERS * self._found.size
+            of_helpers = (float(self._found.sum()) + doubt) / (told + doubt)
         if self._learnt_about is None:
             self._learnt_about = self._about(self._found), self._about(self._told)
-        return _shares(found_about, told_about, *self._learnt_about, of_helpers)
+        learnt_found, learnt_told = self._learnt_about
+        share = (found_about + learnt_found / of_helpers + DOUBT) / (told_about + learnt_told + DOUBT)
+        np.clip(share, LEAST_SHARE, 1.0 / LEAST_SHARE, out=share)
+        return share, np.minimum(of_helpers * share, MOST_OF_TOLD)
 
     def _about(self, values: FloatArray) -> FloatArray:
         """The mean over the cells about each, of those that there are."""
@@ -65,47 +69,50 @@ class Seabed:
 
 
 @compiled
-def _shares(
-    found: FloatArray, told: FloatArray, learnt_found: FloatArray, learnt_told: FloatArray, of_helpers: float
-) -> tuple[FloatArray, FloatArray]:
-    """What part of a primary's look is expected to be found, and of a helper's."""
-    by_tracks, by_helpers = np.empty(found.shape), np.empty(found.shape)
-    for row in range(found.shape[0]):
-        for column in range(found.shape[1]):
-            all_found = found[row, column] + learnt_found[row, column] / of_helpers
-            all_told = told[row, column] + learnt_told[row, column]
-            share = min(max((all_found + DOUBT) / (all_told + DOUBT), LEAST_SHARE), 1.0 / LEAST_SHARE)
-            by_tracks[row, column], by_helpers[row, column] = share, min(of_helpers * share, MOST_OF_TOLD)
-    return by_tracks, by_helpers
-
-
-_shares.called_with(lambda: (*np.zeros((4, 1, 1)), 1.0))
-
-
-@compiled
 def sliding_mean(values: FloatArray, rows_beside: int, columns_beside: int) -> FloatArray:
     """The mean over up to so many rows before and behind each, and then over columns likewise; along an axis for which
     that is below 0 nothing is done."""
-    rows, columns = values.shape
-    mean = values.copy()
-    if rows_beside >= 0:
-        total = np.zeros((rows + 1, columns))
-        for row in range(rows):
-            for column in range(columns):
-                total[row + 1, column] = total[row, column] + values[row, column]
-        for row in range(rows):
-            first, end = max(row - rows_beside, 0), min(row + rows_beside + 1, rows)
-            for column in range(columns):
-                mean[row, column] = (total[end, column] - total[first, column]) / (end - first)
+    mean = _over_rows(values, rows_beside) if rows_beside >= 0 else values.copy()
     if columns_beside >= 0:
-        so_far = np.zeros(columns + 1)
-        for row in range(rows):
-            for column in range(columns):
-                so_far[column + 1] = so_far[column] + mean[row, column]
-            for column in range(columns):
-                first, end = max(column - columns_beside, 0), min(column + columns_beside + 1, columns)
-                mean[row, column] = (so_far[end] - so_far[first]) / (end - first)
+        _over_columns(mean, columns_beside)
     return mean
+
+
+@compiled
+def _over_rows(values: FloatArray, beside: int) -> FloatArray:
+    """Of the sums over the rows before each those are held that are still needed, and turn about take one another's
+    place: all of them do not fit near the processor."""
+    (rows, columns), held = values.shape, 2 * beside + 2
+    mean, sums = np.empty((rows, columns)), np.zeros((held, columns))
+    for row in range(rows + beside):
+        if row < rows:
+            before, behind, its_values = sums[row % held], sums[(row + 1) % held], values[row]
+            for column in range(columns):
+                behind[column] = before[column] + its_values[column]
+        if row >= beside:
+            first, end = max(row - 2 * beside, 0), min(row + 1, rows)
+            before, behind, its_mean, count = sums[first % held], sums[end % held], mean[row - beside], end - first
+            for column in range(columns):
+                its_mean[column] = (behind[column] - before[column]) / count
+    return mean
+
+
+@compiled
+def _over_columns(mean: FloatArray, beside: int) -> None:
+    """In place. Where there are as many to either side the loop has nothing else to ask, and is fast."""
+    rows, columns = mean.shape
+    sums, width = np.zeros(columns + 1), 2 * beside + 1
+    for row in range(rows):
+        its_mean, so_far = mean[row], 0.0
+        for column in range(columns):
+            so_far += its_mean[column]
+            sums[column + 1] = so_far
+        for column in range(beside, columns - beside):
+            its_mean[column] = (sums[column + beside + 1] - sums[column - beside]) / width
+        for near_end in (range(min(beside, columns)), range(max(beside, columns - beside), columns)):
+            for column in near_end:
+                first, end = max(column - beside, 0), min(column + beside + 1, columns)
+                its_mean[column] = (sums[end] - sums[first]) / (end - first)
 
 
 sliding_mean.called_with(lambda: (np.zeros((1, 1)), 1, 1))

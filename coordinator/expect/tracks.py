@@ -15,7 +15,7 @@ from coordinator.vehicles import KnownVehicle
 from planner.curve import NEWEST_CURVES, mean_curve
 from planner.footprints import footprint_of
 from planner.footprints.cells import EDGE_TOLERANCE_M
-from planner.types import BoolArray, DetectionCurve, FloatArray, GridSpec, SweepFrame
+from planner.types import EVERYWHERE, BoolArray, DetectionCurve, FloatArray, GridSpec, SweepFrame, Window
 
 ASSUMED_P_DETECT = 0.5
 """Of a pass, midway between the nadir gap and the range that tracks are spaced for, before anybody has measured any; it
@@ -64,6 +64,7 @@ class ExpectedTracks:
         self._grid = grid
         self._ground = _Kept[_Ground]()
         self._beside = _Kept[_Beside]()
+        self._whole = _Kept[_Nats]()
         self._laid = _Kept[_Nats | None]()
 
     def of(self, primaries: Mapping[str, KnownVehicle]) -> Tracks:
@@ -74,6 +75,7 @@ class ExpectedTracks:
         found = Tracks(*arrays)
         self._ground.begin_round()
         self._beside.begin_round()
+        self._whole.begin_round()
         self._laid.begin_round()
         for vehicle in primaries.values():
             if vehicle.plan is not None:
@@ -92,25 +94,45 @@ class ExpectedTracks:
             self._beside.value(one, partial(_beside, there, curve)) for one, there in zip(tracks, ground, strict=True)
         ]
         passed_m = [_passed_m(track, vehicle, lead_m) for track in plan.tracks]
-        for one, its_m in zip(beside, passed_m, strict=True):
-            seen = one.flown(its_m)
-            if seen is not None:
-                found.flown[one.window] += seen
+        flown = [number for number, its_m in enumerate(passed_m) if its_m == np.inf]
+        under_way = [number for number, its_m in enumerate(passed_m) if np.isfinite(its_m)]
+        if flown:
+            np.add(found.flown, self._of_whole(tracks, beside, flown)[0], out=found.flown)
+        for number in under_way:
+            found.flown[beside[number].window] += beside[number].flown(passed_m[number])
         if vehicle.finished_ms is not None:
             return
         known = len(tracks) - plan.tentative
-        _add_ahead((found.ahead, found.largest_ahead), beside[:known], passed_m[:known])
+        ahead = [number for number in range(known) if passed_m[number] == -np.inf]
+        if ahead:
+            _add_to((found.ahead, found.largest_ahead), EVERYWHERE, self._of_whole(tracks, beside, ahead))
+        for number in under_way:
+            if number < known:
+                seen = beside[number].ahead(passed_m[number])
+                _add_to((found.ahead, found.largest_ahead), beside[number].window, (seen, seen))
         key = tuple(tracks), plan.tentative, tuple(passed_m[known:])
         laid = self._laid.value(key, partial(self._wherever_laid, plan, beside[known:], passed_m[known:]))
         if laid is not None:
-            np.add(found.ahead, laid[0], out=found.ahead)
-            np.maximum(found.largest_ahead, laid[1], out=found.largest_ahead)
+            _add_to((found.ahead, found.largest_ahead), EVERYWHERE, laid)
+
+    def _of_whole(self, tracks: Sequence[_Track], beside: Sequence[_Beside], numbers: Sequence[int]) -> _Nats:
+        """What some tracks see from end to end, summed, and the largest single look."""
+
+        def made() -> _Nats:
+            total, largest = np.zeros((2, *self._grid.shape))
+            for one in numbers:
+                _add_to((total, largest), beside[one].window, (beside[one].nats, beside[one].nats))
+            return total, largest
+
+        return self._whole.value(tuple(tracks[one] for one in numbers), made)
 
     def _wherever_laid(self, plan: Plan, beside: Sequence[_Beside], passed_m: Sequence[float]) -> _Nats | None:
         """Summed, and the largest single look, on average over where tracks may come to lie that are not settled yet:
         anywhere up to half of what tracks are apart to either side, all together. None where there are none."""
         total, largest = np.zeros((2, *self._grid.shape))
-        _add_ahead((total, largest), beside, passed_m)
+        for one, its_m in zip(beside, passed_m, strict=True):
+            seen = one.ahead(its_m)
+            _add_to((total, largest), one.window, (seen, seen))
         return (_shifted(self._grid, plan, total), _shifted(self._grid, plan, largest)) if total.any() else None
 
 
@@ -119,7 +141,7 @@ class _Ground:
     """A window of the grid beside a track: how far its cells lie from that and along it, and which ones lie between its
     ends."""
 
-    window: tuple[slice, slice]
+    window: Window
     lateral_m: FloatArray
     along_m: FloatArray
     is_beside: BoolArray
@@ -130,31 +152,24 @@ class _Beside:
     """What one track makes of a window of the grid: -ln(1 - P_d) of a look at each cell, and how far along the track
     each lies."""
 
-    window: tuple[slice, slice]
+    window: Window
     along_m: FloatArray
     nats: FloatArray
 
-    def flown(self, passed_m: float) -> FloatArray | None:
-        """What of it is seen where so much of the track is passed; None for nothing."""
-        if np.isinf(passed_m):
-            return self.nats if passed_m > 0 else None
+    def flown(self, passed_m: float) -> FloatArray:
+        """What of it is seen where so much of the track is passed."""
         return np.where(self.along_m <= passed_m, self.nats, 0.0)
 
-    def ahead(self, passed_m: float) -> FloatArray | None:
-        """What of it is still to be seen then; None for nothing."""
-        if np.isinf(passed_m):
-            return None if passed_m > 0 else self.nats
+    def ahead(self, passed_m: float) -> FloatArray:
+        """What of it is still to be seen then."""
         return np.where(self.along_m <= passed_m, 0.0, self.nats)
 
 
-def _add_ahead(to: _Nats, beside: Iterable[_Beside], passed_m: Iterable[float]) -> None:
-    """What is still to be seen of some tracks, to a sum and to the largest single look."""
-    total, largest = to
-    for one, its_m in zip(beside, passed_m, strict=True):
-        nats = one.ahead(its_m)
-        if nats is not None:
-            total[one.window] += nats
-            np.maximum(largest[one.window], nats, out=largest[one.window])
+def _add_to(to: _Nats, window: Window, seen: _Nats) -> None:
+    """Adds what is seen of a window to a sum, and to the largest single look."""
+    (total, largest), (its_sum, its_largest) = to, seen
+    total[window] += its_sum
+    np.maximum(largest[window], its_largest, out=largest[window])
 
 
 def _shifted(grid: GridSpec, plan: Plan, nats: FloatArray) -> FloatArray:

@@ -14,7 +14,7 @@ from told_tile import Tile
 
 from planner.fleet_map import MOST_STARTS, FleetMap
 from planner.risk import LevelArray
-from planner.types import BoolArray, GridSpec, SweepFrame
+from planner.types import EVERYWHERE, BoolArray, GridSpec, SweepFrame
 
 GRID = GridSpec(SweepFrame(0.0, 0.0, 0.0), 5.0, columns=23, rows=22)
 # Its four tiles: (first row, first column, rows, columns).
@@ -150,6 +150,27 @@ def test_a_window_alone_has_the_risk_that_it_has_in_the_whole(told: list[TileNew
         levels, risk = fleet.levels_within(window, vehicles)
         np.testing.assert_allclose(risk[levels], fleet.risk[window], rtol=0 if rho == 0 else 0.001)
         np.testing.assert_array_equal(levels == 0, fleet.risk[window] == 1)
+
+
+@given(published(), st.tuples(*[st.integers(0, 30)] * 4))
+def test_what_is_told_in_a_window_is_what_is_told_there_of_the_whole(
+    told: list[TileNews], bounds: tuple[int, int, int, int]
+) -> None:
+    fleet, (row, end_row, column, end_column) = FleetMap(GRID), bounds
+    for news in told:
+        news.give(fleet)
+    window = slice(row, max(row, end_row)), slice(column, max(column, end_column))
+    sums, largest = (np.zeros(GRID.shape, dtype=np.int64) for _ in range(2))
+    for layer in fleet.layers.values():
+        sums += layer.sum_levels
+        largest = np.maximum(largest, layer.largest_levels)
+    np.testing.assert_array_equal(fleet.sums(EVERYWHERE, fleet.layers), sums)
+    np.testing.assert_array_equal(fleet.sums(window, fleet.layers), sums[window])
+    np.testing.assert_array_equal(fleet.largest(window), largest[window])
+    settled = fleet.settled_by(fleet.layers)
+    np.testing.assert_array_equal(fleet.settled_by(fleet.layers, window), settled[window])
+    assert (settled == np.any([layer.settled for layer in fleet.layers.values()], axis=0)).all()
+    assert not fleet.sums(window, []).any()
 
 
 def test_a_window_is_told_in_levels_and_with_a_rho_in_parts_of_them() -> None:

@@ -12,8 +12,8 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planner.hotspots import Hotspot, HotspotMap, HotspotUpdate, blocks_about, update_hotspots
-from planner.types import BoolArray, FloatArray, GridSpec, Point, SweepFrame
+from planner.hotspots import Hotspot, HotspotMap, HotspotUpdate, blocks_about, update_hotspots, window_about
+from planner.types import EVERYWHERE, BoolArray, FloatArray, GridSpec, Point, SweepFrame
 
 GRID = GridSpec(SweepFrame(100, 200, 0), 5, columns=12, rows=6)
 NONE = np.zeros(GRID.shape, dtype=bool)
@@ -384,7 +384,7 @@ class TestWindows:
     def test_a_window_of_blocks_that_holds_all_has_the_hotspots_of_the_whole_grid(
         self, seed: int, rows: tuple[int, int], columns: tuple[int, int]
     ) -> None:
-        rng, block_m, terms = np.random.default_rng(seed), 25, {"block_m": 25.0, "least_area_m2": 50.0}
+        rng, block_m, least_area_m2 = np.random.default_rng(seed), 25.0, 50.0
         inside = np.zeros(self.GRID.shape, dtype=np.bool_)
         inside[5 * rows[0] : 5 * rows[1], 5 * columns[0] : 5 * columns[1]] = True
         window = blocks_about(self.GRID, inside, block_m)
@@ -393,14 +393,52 @@ class TestWindows:
             hot = inside & (rng.random(self.GRID.shape) < 0.6)
             unsettled = inside & ~hot & (rng.random(self.GRID.shape) < 0.3)
             risk = rng.random(self.GRID.shape)
-            of_whole = update_hotspots(self.GRID, hot, unsettled, risk, whole, **terms)
-            of_part = update_hotspots(self.GRID, hot[window], unsettled[window], risk[window], part, **terms)
+            of_whole, of_part = (
+                update_hotspots(self.GRID, *cells, before, block_m=block_m, least_area_m2=least_area_m2)
+                for cells, before in (
+                    ((hot, unsettled, risk), whole),
+                    ((hot[window], unsettled[window], risk[window]), part),
+                )
+            )
             assert of_part.changed == of_whole.changed
             assert of_part.withdrawn == of_whole.withdrawn
             whole, part = of_whole.map, of_part.map
             assert part.hotspots == whole.hotspots
             assert (part.numbers == whole.numbers[window]).all()
             assert part.numbers.any()
+
+    @given(st.integers(0, 1_000_000), st.booleans())
+    def test_where_only_a_part_has_changed_it_is_enough_to_look_at_that(self, seed: int, grows: bool) -> None:
+        rng, (rows, columns) = np.random.default_rng(seed), self.GRID.shape
+        of_all = of_part = HotspotMap.empty(self.GRID)
+        hot, unsettled, risk = (
+            np.zeros((rows, columns), dtype=np.bool_),
+            rng.random(self.GRID.shape) < 0.3,
+            np.ones(self.GRID.shape),
+        )
+        for turn in range(4):
+            row, column = rng.integers(rows), rng.integers(columns)
+            part = slice(row, row + rng.integers(8)), slice(column, column + rng.integers(8))
+            hot[part] = rng.random(hot[part].shape) < 0.7
+            if grows:
+                unsettled[part] = ~hot[part] & (rng.random(hot[part].shape) < 0.5)
+            risk[part] = rng.random(hot[part].shape)
+            all_of_it, some = (
+                update_hotspots(self.GRID, hot, unsettled, risk, before, part=its, block_m=25.0, least_area_m2=50.0)
+                for before, its in ((of_all, EVERYWHERE), (of_part, part if turn else EVERYWHERE))
+            )
+            assert some.changed == all_of_it.changed
+            assert some.withdrawn == all_of_it.withdrawn
+            of_all, of_part = all_of_it.map, some.map
+            assert of_part.hotspots == of_all.hotspots
+            assert (of_part.numbers == of_all.numbers).all()
+
+
+def test_the_rows_and_columns_that_hold_some_cells() -> None:
+    cells = NONE.copy()
+    assert window_about(cells) == (slice(0, 0), slice(0, 0))
+    cells[3, 7] = cells[5, 2] = True
+    assert window_about(cells) == (slice(3, 6), slice(2, 8))
 
 
 class TestRefusals:

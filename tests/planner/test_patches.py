@@ -35,17 +35,25 @@ def cells_where(cells: BoolArray) -> list[Cell]:
 
 
 @given(st.data(), SHAPES)
-def test_what_is_another_than_before_lies_within_the_bounds(data: st.DataObject, shape: Cell) -> None:
+def test_what_has_become_another_lies_within_the_bounds(data: st.DataObject, shape: Cell) -> None:
     hot, unsettled, growing_before = (data.draw(arrays(np.bool_, shape)) for _ in range(3))
     risk, risk_before = (data.draw(arrays(np.float64, shape, elements=st.sampled_from([0.0, 0.5]))) for _ in range(2))
     risk_before[data.draw(arrays(np.bool_, shape))] = NOT_HOT
-    now, growing = risk.copy(), np.zeros(shape, dtype=np.bool_)
-    bounds = _compared(hot, unsettled, now, growing, risk_before, growing_before)
-    assert now.tolist() == np.where(hot, risk, NOT_HOT).tolist()
+    part = (
+        *sorted(data.draw(st.tuples(*[st.integers(0, shape[0])] * 2))),
+        *sorted(data.draw(st.tuples(*[st.integers(0, shape[1])] * 2))),
+    )
+    now, growing = risk_before.copy(), growing_before.copy()
+    bounds = _compared(hot, unsettled, risk, part, now, growing)
+    expected, expected_growing = risk_before.copy(), growing_before.copy()
     open_cells = set(cells_where(unsettled))
     for row, column in np.ndindex(shape):
         beside = {(row - 1, column), (row + 1, column), (row, column - 1), (row, column + 1)}
-        assert growing[row, column] == (hot[row, column] and bool(beside & open_cells))
+        if part[0] - 1 <= row <= part[1] and part[2] - 1 <= column <= part[3]:
+            expected[row, column] = risk[row, column] if hot[row, column] else NOT_HOT
+            expected_growing[row, column] = hot[row, column] and bool(beside & open_cells)
+    assert now.tolist() == expected.tolist()
+    assert growing.tolist() == expected_growing.tolist()
     others = cells_where((now != risk_before) | (growing != growing_before))
     if others:
         rows, columns = zip(*others, strict=True)
@@ -159,11 +167,12 @@ def numbers_by_definition(patches: dict[int, list[Cell]], before: dict[Cell, int
 def test_numbers_are_carried_on(data: st.DataObject, shape: Cell, block: int, least_m2: float) -> None:
     hot, unsettled, growing_before = (data.draw(arrays(np.bool_, shape)) for _ in range(3))
     before = data.draw(arrays(np.int32, shape, elements=st.integers(0, 5)))
-    risk, growing = data.draw(arrays(np.float64, shape, elements=st.floats(0, 1))), np.zeros(shape, dtype=np.bool_)
+    risk = data.draw(arrays(np.float64, shape, elements=st.floats(0, 1)))
     risk_before = np.where(data.draw(arrays(np.bool_, shape)), risk, NOT_HOT)
-    given_before = (risk_before, growing_before, before.copy())
-    found = carried_on(hot, unsettled, risk, growing, *given_before, 6, block, (3.0, least_m2))
+    given_before, all_of_it = (risk_before, growing_before, before.copy()), (0, shape[0], 0, shape[1])
+    found = carried_on(hot, unsettled, risk, all_of_it, *given_before, 6, block, (3.0, least_m2))
 
+    risk, growing = found.risk, found.growing
     others = np.argwhere((risk != risk_before) | (growing != growing_before))
     if not others.size:
         assert found.window[0] >= found.window[1]

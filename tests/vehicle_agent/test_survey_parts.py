@@ -22,7 +22,7 @@ from comms.said.messages import AgentState, Hotspot, HotspotState, ManeuverState
 from planner.footprints.wedge import ForwardLooking
 from planner.region import Region
 from planner.spacing_planners import FixedSpacing, SpacingDecision
-from planner.types import Point, SonarShape, Track
+from planner.types import EVERYWHERE, Point, SonarShape, Track
 from vehicle_agent.survey import SurveyAgent
 
 SEES_TO_130_M = flat(0.3, 25, 130)
@@ -180,7 +180,7 @@ def test_hotspots_are_looked_for_each_30_s_where_there_were_looks() -> None:
         (due_ms, True, due_ms + 30_000),
         (due_ms + 31_000, True, due_ms + 61_000),
     ):
-        node._new_looks = new_looks
+        node._looked_at[:] = [EVERYWHERE] * new_looks
         node.report(now_ms)
         assert node._hotspots_due_ms == then_ms
 

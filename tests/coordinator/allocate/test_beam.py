@@ -91,7 +91,7 @@ def serve(team: Found, plans: Plans, place: int, turn: int) -> None:
     """In all of these plans who is next serves a strip."""
     nexts, ahead = look_ahead(team, plans)
     for row, one in enumerate(nexts):
-        _serve(team, _plan(plans, row), one, place, _ahead(ahead, row), turn)
+        _serve(team, _plan(plans, row), one, place, ahead.ends_s[row, place], ahead.gained_m2[row, place], turn)
 
 
 def still_m2(team: Found, plans: Plans, nexts: Sequence[int], ahead: Ahead) -> FloatArray:
@@ -106,7 +106,7 @@ def completed(team: Found, plans: Plans, row: int, turn: int) -> tuple[Plans, in
     """One of these plans gone on with by what brings most a second, and which turn would be next."""
     lone = begun(team)
     _copy(_plan(plans, row), _plan(lone, 0))
-    return lone, _complete(team, _plan(lone, 0), _ahead(nothing_ahead(team), 0), turn)
+    return lone, _complete(team, _plan(lone, 0), turn)
 
 
 def served(job: OpenStrip, one: Helper) -> Helper:
@@ -494,7 +494,7 @@ class TestGrown:
         team = both()
         plans = begun(team, 2)
         one, other = _plan(plans, 0), _plan(plans, 1)
-        _serve(team, one, 0, 1, _ahead(look_ahead(team, begun(team))[1], 0), 3)
+        _serve(team, one, 0, 1, 152.5, 700.0, 3)
         one.is_done[1] = True
         _copy(one, other)
         for array in plans:

@@ -8,14 +8,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 from by_hand import FLEET, HELPER, PRIMARY, run_info, vehicle
-from compiling import needs_compiling, times_compiled
 from coordinator_by_hand import GRID, HOT, HOT_CELLS, PATIENCE, box
 
 from comms.said.announcement import Role, RosterVehicle
 from comms.said.codec import Header
 from comms.said.messages import CoverageTile, Hotspot, HotspotState, Plan, PlannedTrack
 from coordinator.cut.window import Window
-from coordinator.expect.expectation import Expectation, ExpectedMap, _add
+from coordinator.expect.expectation import Expectation, ExpectedMap
 from coordinator.fleet import KnownFleet
 from planner.risk import to_levels
 from planner.tiles import tiles
@@ -71,20 +70,6 @@ class Told:
 def told_p(p_detect: float) -> float:
     """What is left of a P_d once it is told in whole levels."""
     return 1 - math.exp(-0.02 * round(-math.log1p(-p_detect) / 0.02))
-
-
-@needs_compiling
-def test_what_was_told_is_added_up_by_one_compiled_function_of_a_map_and_of_a_part_of_it() -> None:
-    for place in (EVERYWHERE, Window(0, 20, 10, 30)):
-        told = Told(place=place)
-        told.layer(PRIMARY, 0.5, largest=0.3)
-        told.layer(HELPER, 0.2)
-        primaries, helpers, largest_levels = told.expected._told_so_far()
-        assert primaries == pytest.approx(0.02 * round(-math.log(0.5) / 0.02))
-        assert helpers == pytest.approx(0.02 * round(-math.log(0.8) / 0.02))
-        assert set(largest_levels.ravel().tolist()) == {round(-math.log(0.7) / 0.02)}
-        assert primaries.shape == (place.rows, place.end_column - place.first_column)
-    assert times_compiled(_add) == 1
 
 
 class TestTracksToCome:

@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from coordinator_by_hand import ELSEWHERE, GRID, HOT, HOT_CELLS, box
+from hypothesis import given
+from hypothesis import strategies as st
 
 from comms.said.announcement import Vertex
 from comms.said.messages import Hotspot, HotspotState
@@ -135,3 +137,20 @@ def test_two_hotspots_of_one_start_are_two(hotspots: Hotspots) -> None:
         assert hotspots.hear(("p", number), FIRST, hotspot(place, risk))
         assert not hotspots.hear(("p", number), FIRST, hotspot(place, risk))
     assert (drawn(hotspots) == told((HOT_CELLS, 0.5), (ELSEWHERE_CELLS, 0.7))).all()
+
+
+@given(st.lists(st.tuples(st.integers(1, 4), st.integers(0, 11), st.booleans()), min_size=1, max_size=12))
+def test_asked_in_between_it_has_drawn_what_one_has_that_is_asked_at_the_end(
+    words: list[tuple[int, int, bool]],
+) -> None:
+    everywhere = np.ones(GRID.shape, dtype=np.bool_)
+    one, other = Hotspots(GRID, everywhere), Hotspots(GRID, everywhere)
+    for revision, (number, place, asked) in enumerate(words):
+        x_m, y_m = 50.0 + 40.0 * (place % 4), 60.0 * (place // 4)  # which lie on their neighbours, but for the last
+        message = hotspot(None if place == 11 else (x_m, y_m, x_m + 60, y_m + 80), 0.5 + place / 100)
+        # Each third is one of another start, and so one more: of the oldest starts in the end nothing new is heard.
+        for hotspots in (one, other):
+            hotspots.hear(("p", number), (revision // 3, revision), message)
+        if asked:
+            drawn(one)
+    assert (drawn(one) == drawn(other)).all()
