@@ -211,6 +211,8 @@ class Modem:
             self._incarnation = received.header.incarnation
             if isinstance(message, AgentState):
                 self._state_ms = now_ms
+                if own_map is not None:
+                    own_map.hear_state(message)
                 if self._over is not None and not (message.mode.has_ended or message.mode.is_out_of_work):
                     self._here.say(*self._over)  # it was started anew since, or has not heard it
         if not is_hub and not self._is_news(received, now_ms):

@@ -5,7 +5,7 @@ has room how far what stretches tell is off.
 from __future__ import annotations
 
 from comms.said.announcement import RosterVehicle
-from comms.said.messages import CoverageTile, Curve, Look, TaskState, TaskStatus
+from comms.said.messages import AgentState, CoverageTile, Curve, Look, TaskState, TaskStatus
 from comms.said.wire import WireError
 from modem.config import ModemConfig
 from modem.correcting import Correcting
@@ -61,6 +61,12 @@ class OwnMap:
         """A tile of its map as it is."""
         if self._correcting is not None:
             self._correcting.hear_tile(tile, now_ms)
+
+    def hear_state(self, state: AgentState) -> None:
+        """Its vehicle tells at which strip it is, of which this modem may have heard no word, as it was started anew
+        since."""
+        if self._by_strips and state.works_on:
+            self._held_of = state.works_on
 
     def hear_status(self, status: TaskStatus, now_ms: int) -> list[Stretch]:
         """What was seen of the strip under way is said where that ends and is not done."""

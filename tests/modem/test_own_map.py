@@ -9,7 +9,7 @@ import pytest
 from along_a_track import CURVE, GRID, LOOKS, PRIMARY, gathered, layer, look
 from modems import RUN_INFO, config_of
 
-from comms.said.messages import CoverageTile, TaskState, TaskStatus
+from comms.said.messages import AgentState, CoverageTile, Mode, TaskState, TaskStatus
 from modem.letters import Letters
 from modem.own_map import OwnMap
 from modem.stretches import LayerOf
@@ -71,6 +71,16 @@ class TestHeld:
         assert told.hear_status(replace(status(state), strip=8), 3000) == []  # of another strip
         (said,) = told.hear_status(status(state), 3000)
         assert said.length_m == 100.0
+
+    @pytest.mark.parametrize(("ends", "said"), [(TaskState.DONE, 0), (TaskState.FAILED, 1)])
+    def test_a_modem_started_anew_at_a_strip_knows_it_by_its_vehicles_state(self, ends: TaskState, said: int) -> None:
+        told = own_map(start=1, by_strips=True)
+        told.hear_state(AgentState(Mode.REVISIT, status(ends).strip, 0.5, 0, 0.0, 0.0, 0.0))
+        for one in LOOKS[:5]:
+            told.hear_look(one, 1000)
+        told.flush(2000)
+        told.hear_state(AgentState(Mode.REVISIT, 0, 0.5, 0, 0.0, 0.0, 0.0))
+        assert len(told.hear_status(status(ends), 3000)) == said
 
     def test_others_say_it_at_once(self) -> None:
         told = own_map()
