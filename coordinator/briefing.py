@@ -41,7 +41,7 @@ class Briefing:
 
     def situation(self, now_ms: int, sector: Sector) -> Situation:
         """What is decided on now in a sector: of its open strips, and for who is in its team, by name."""
-        records = [one for one in self._ledger.in_state(StripState.OPEN) if sector.holds(one.window)]
+        records = self._ledger.open_in(sector.number)
         found = (self._helper(self._vehicles[name], records, now_ms) for name in sorted(sector.team))
         deadline_s = self.expected_deadline_s()
         return Situation(

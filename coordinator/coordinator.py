@@ -113,7 +113,6 @@ class Coordinator:
         region = Region(run.outline, run.hole_outlines, run.keep_out_outlines)
         inside = region.inside(run.grid.spec)
         self.fleet = fleet = KnownFleet(run, config.patience, now_ms, config.flows)
-        ledger = Ledger(self._first_number)
         helpers = [one.entry for one in fleet.helpers]
         # Where none of them comes to from its home no second look goes.
         homes = [(one.home_x_m, one.home_y_m) for one in helpers]
@@ -121,6 +120,7 @@ class Coordinator:
         narrowest = min(helpers, key=lambda one: footprint_of(one.sonar).reach.strip_width_m, default=None)
         p_detect = 0.0 if narrowest is None else narrowest.p_detect
         self._sectors = sectors = Sectors(_sectors(config, fleet, in_reach, p_detect), run.grid.spec, agenda)
+        ledger = Ledger(self._first_number, lambda window: sectors.of(window).number)
         self._strips = strips = StripLife(
             ledger, fleet, inside, sectors, outbox, config.answer_within_ms, config.looks_within_ms
         )

@@ -4,7 +4,8 @@ is a mistake of ours."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections import defaultdict
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from comms.said.messages import StripState
@@ -51,10 +52,13 @@ class StripRecord:
 
 
 class Ledger:
-    """All strips by number, counted from `first_number`, 1 or more."""
+    """All strips by number, counted from `first_number`, 1 or more. `sector_of`: the number of the sector in which a
+    window lies; there is one alone where nothing is said."""
 
-    def __init__(self, first_number: int = 1) -> None:
+    def __init__(self, first_number: int = 1, sector_of: Callable[[Window], int] = lambda _: 0) -> None:
         self._first_number = first_number
+        self._sector_of = sector_of
+        self._open_in = defaultdict[int, set[int]](set)
         self._records: dict[int, StripRecord] = {}
         self._by_state: dict[StripState, set[int]] = {state: set() for state in StripState}
         self._with: dict[str, int] = {}  # the strip of each vehicle that has one
@@ -89,6 +93,7 @@ class Ledger:
         record = StripRecord(strip, cut, StripState.OPEN, 1, "", now_ms, reason)
         self._records[strip.number] = record
         self._by_state[record.state].add(strip.number)
+        self._open_in[self._sector_of(record.window)].add(strip.number)
         return record
 
     def revise(self, record: StripRecord, strip: Strip, cut: Cut) -> None:
@@ -97,7 +102,9 @@ class Ledger:
             raise ValueError(f"strip {record.strip.number} is {record.state.value}: only an open one can be revised")
         if strip.number != record.strip.number:
             raise ValueError(f"strip {record.strip.number} cannot be revised as strip {strip.number}")
+        self._open_in[self._sector_of(record.window)].discard(strip.number)
         record.strip, record.cut = strip, cut
+        self._open_in[self._sector_of(record.window)].add(strip.number)
         record.revision += 1
 
     def move(self, record: StripRecord, state: StripState, now_ms: int, reason: str, vehicle: str = "") -> None:
@@ -110,6 +117,9 @@ class Ledger:
         number = record.strip.number
         self._by_state[record.state].discard(number)
         self._by_state[state].add(number)
+        if StripState.OPEN in (state, record.state):
+            numbers = self._open_in[self._sector_of(record.window)]
+            numbers.add(number) if state is StripState.OPEN else numbers.discard(number)
         if record.state in TAKEN:
             del self._taken(record.state)[record.vehicle]
         if state in TAKEN:
@@ -145,3 +155,7 @@ class Ledger:
         numbers = [number for state in states for number in self._by_state[state]]
         numbers.sort()
         return [self._records[number] for number in numbers]
+
+    def open_in(self, sector: int) -> list[StripRecord]:
+        """The open strips in a sector, by number."""
+        return [self._records[number] for number in sorted(self._open_in[sector])]

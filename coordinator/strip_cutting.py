@@ -9,7 +9,6 @@ from dataclasses import replace
 import numpy as np
 
 from comms.said.announcement import RosterVehicle
-from comms.said.messages import StripState
 from coordinator.allocate.routes import plan_each
 from coordinator.allocate.situation import HORIZON_S, Situation
 from coordinator.briefing import Briefing
@@ -129,7 +128,7 @@ class StripCutting:
         )
         flown_anyway = [*ledger.in_state(*TAKEN), *self._strips.awaited]
         claimed = [one.window.within(place) for one in flown_anyway if one.window.shared(place)]
-        unmatched = [one for one in ledger.in_state(StripState.OPEN) if sector.holds(one.window)]
+        unmatched = ledger.open_in(sector.number)
         opened = [record.window.within(place) for record in unmatched]
         situation = self._briefing.situation(now_ms, sector)
         time_m, flown = self._briefing.time_m(situation, sector), self._flown(situation)

@@ -8,7 +8,7 @@ and reordered tiles converge to one map.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import reduce
 from typing import Protocol
@@ -205,10 +205,9 @@ class FleetMap:
     def settled_by(self, vehicles: Iterable[str], window: Window = EVERYWHERE) -> BoolArray:
         """Cells of a window that one of these vehicles has declared settled."""
         settled: BoolArray = np.zeros(self._unseen[window].shape, dtype=np.bool_)
-        for vehicle in vehicles:
-            if vehicle in self.layers:
-                to, its = self._shared(window, self.layers[vehicle])
-                settled[to] |= self.layers[vehicle].settled[its]
+        layers = [self.layers[vehicle] for vehicle in vehicles if vehicle in self.layers]
+        for layer, to, its in self._shared(window, layers):
+            settled[to] |= layer.settled[its]
         return settled
 
     def sums(self, window: Window, vehicles: Iterable[str]) -> NDArray[np.unsignedinteger]:
@@ -252,24 +251,24 @@ class FleetMap:
 
     def _sums(self, window: Window, layers: Sequence[VehicleLayer]) -> NDArray[np.unsignedinteger]:
         sums = self._unseen[window].astype(np.min_scalar_type(MOST_LEVELS * len(layers)))
-        for layer in layers:
-            to, its = self._shared(window, layer)
+        for layer, to, its in self._shared(window, layers):
             sums[to] += layer.sum_levels[its]
         return sums
 
     def _largest(self, window: Window, layers: Iterable[VehicleLayer]) -> LevelArray:
         largest = self._unseen[window].copy()
-        for layer in layers:
-            to, its = self._shared(window, layer)
+        for layer, to, its in self._shared(window, layers):
             np.maximum(largest[to], layer.largest_levels[its], out=largest[to])
         return largest
 
-    def _shared(self, window: Window, layer: VehicleLayer) -> tuple[Window, Window]:
-        """What of a window a layer may have told of, within the window and within the map; both empty for nothing."""
-        to, its = [], []
-        for here, told, size in zip(window, layer.told, self.grid.shape, strict=True):
-            begin, end, _ = here.indices(size)
-            first, behind = max(begin, told.start), min(end, told.stop)
-            its.append(slice(first, max(first, behind)))
-            to.append(slice(first - begin, max(first, behind) - begin))
-        return (to[0], to[1]), (its[0], its[1])
+    def _shared(self, window: Window, layers: Iterable[VehicleLayer]) -> Iterator[tuple[VehicleLayer, Window, Window]]:
+        """The layers that may have told of some of a window, of a large fleet's few, and what that is, within the
+        window and within the map."""
+        (row, end_row, _), (column, end_column, _) = map(slice.indices, window, self.grid.shape)
+        for layer in layers:
+            rows, columns = layer.told
+            first, end = max(row, rows.start), min(end_row, rows.stop)
+            left, right = max(column, columns.start), min(end_column, columns.stop)
+            if first < end and left < right:
+                to = slice(first - row, end - row), slice(left - column, right - column)
+                yield layer, to, (slice(first, end), slice(left, right))

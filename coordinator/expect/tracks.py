@@ -191,9 +191,9 @@ def _shifted(grid: GridSpec, plan: Plan, nats: FloatArray) -> FloatArray:
 
 def curve_of(vehicle: KnownVehicle, primaries: Iterable[KnownVehicle]) -> DetectionCurve:
     """P(y) that a primary's tracks are expected to have, by what it and the others have measured."""
-    alike = [vehicle, *(one for one in primaries if one.entry.footprint == vehicle.entry.footprint)]
-    measured = next((one.curves for one in alike if one.curves), None)
-    if measured is None:
+    alike = (one.curves for one in primaries if one.curves and one.entry.footprint == vehicle.entry.footprint)
+    measured = vehicle.curves or next(alike, {})
+    if not measured:
         near_m, far_m = vehicle.entry.near_m, float(max(vehicle.plan.r_adpt_m, default=0) if vehicle.plan else 0)
         across = np.linspace(0.0, 1.0, 21)
         range_m = near_m + across * (max(far_m, near_m + 1.0) - near_m)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -46,10 +47,15 @@ def briefing_of(config: CoordinatorConfig, fleet: KnownFleet, ledger: Ledger | N
 class Known:
     """What a coordinator knows of the fleet by hand, and its briefing."""
 
-    def __init__(self, config: CoordinatorConfig = CONFIG, keep_out: tuple[Zone, ...] = ()) -> None:
+    def __init__(
+        self,
+        config: CoordinatorConfig = CONFIG,
+        keep_out: tuple[Zone, ...] = (),
+        sector_of: Callable[[Window], int] = lambda _: 0,
+    ) -> None:
         run = replace(run_info(400, 400), keep_out=keep_out)
         self.fleet = KnownFleet(run, config.patience, 0)
-        self.ledger = Ledger()
+        self.ledger = Ledger(sector_of=sector_of)
         self.briefing = briefing_of(config, self.fleet, self.ledger)
         self.sector = whole(self.fleet)
 
@@ -254,12 +260,13 @@ def test_where_nothing_is_offered_ahead_who_is_late_is_busy() -> None:
 
 
 def test_a_sector_is_told_of_its_own_strips_and_helpers_alone() -> None:
-    known = Known()
+    known = Known(sector_of=lambda window: 0 if window.first_row < 40 else 1)
     known.heard(HELPER, Mode.IDLE)
     for number, first_row in enumerate((0, 40), 1):
         cut = Cut(Window(first_row, first_row + 30, 20, 30), counts_m2=4200.0, removable_m2=2100.0)
         known.ledger.open(cut.strip(known.fleet.map.grid, number), cut, 0, "badly seen")
     south, north = (sector(known.fleet, Window(first, first + 40, 0, 81)) for first in (0, 40))
+    north.number = 1
     north.team.add(HELPER)
     told = [known.briefing.situation(60_000, one) for one in (south, north)]
     assert [[one.strip.number for one in each.strips] for each in told] == [[1], [2]]

@@ -161,6 +161,25 @@ def test_strips_are_numbered_from_1_and_never_taken_out() -> None:
     assert ledger.in_state(OPEN) == [records[0], records[2]]
 
 
+@given(st.lists(st.tuples(st.integers(1, 4), st.sampled_from([None, *StripState]), st.integers(0, 2)), max_size=20))
+def test_what_is_open_in_a_sector_is_told_whatever_became_of_it(
+    changes: list[tuple[int, StripState | None, int]],
+) -> None:
+    ledger = Ledger(sector_of=lambda window: window.first_row)
+    cuts = [Cut(Window(row, row + 1, 0, 10), 100, 100) for row in range(3)]
+    for number, state, row in changes:
+        record = ledger.get(number)
+        if record is None:
+            ledger.open(strip(ledger.next_number), cuts[row], 5, "badly seen")
+        elif state is None and record.state is OPEN:
+            ledger.revise(record, strip(number), cuts[row])
+        elif state in WAYS_TO and (record.state, state) in ALLOWED:
+            ledger.move(record, state, 10, "", record.vehicle or f"vehicle {number}")
+        for sector in range(3):
+            expected = [one for one in ledger.in_state(OPEN) if one.window.first_row == sector]
+            assert ledger.open_in(sector) == expected
+
+
 def test_numbers_may_begin_anywhere() -> None:
     ledger = Ledger(first_number=900_001)
     assert [opened(ledger).strip.number for _ in range(2)] == [900_001, 900_002]
