@@ -50,18 +50,22 @@ class Presence:
         self._entry, self._keep_out, self._reckons_ways = entry, keep_out, reckons_ways
         self._state: AgentState | None = None
         self._incarnation = 0
+        self._takes_strips = entry.role is not Role.SURVEY_REVISIT  # that does once it has surveyed
         self._said_ms = 0
         self._sweep: Sweep | None = None  # as it is taken to fly the strip that it works on
         self._way: Way = ()  # and to come there from where it was told
 
     def hear_state(self, state: AgentState, incarnation: int, said_ms: int) -> None:
         """It says its state."""
-        if self._state is None or state.works_on != self._state.works_on:
+        if self._entry.role is Role.SURVEY_REVISIT:  # started anew it may survey anew: what it works on is a track
+            has_surveyed = self._takes_strips and incarnation == self._incarnation
+            self._takes_strips = has_surveyed or state.mode in (Mode.FINISHED, Mode.REVISIT)
+        if self._state is None or state.works_on != self._state.works_on or not self._takes_strips:
             self._sweep = None
         self._state, self._incarnation = state, incarnation
         self.told_ms = self._said_ms = said_ms
         self._way = ()
-        if state.mode is Mode.TRANSIT and state.works_on in self.strips:
+        if state.mode is Mode.TRANSIT and self._takes_strips and state.works_on in self.strips:
             self._set_out(state, self.strips[state.works_on])
 
     def hear_status(self, status: TaskStatus, said_ms: int) -> bool:
@@ -72,6 +76,8 @@ class Presence:
         told = self._state
         if told is not None and (told.mode, told.works_on) == (_MODES.get(status.state), status.strip):
             return False  # it has said so before, and has gone on since
+        if status.state in _MODES:
+            self._takes_strips = True
         if status.state is TaskState.ACCEPTED:
             self._accept(state, status, said_ms)
         elif status.state is TaskState.UNDER_WAY:

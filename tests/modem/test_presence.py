@@ -8,6 +8,7 @@ from dataclasses import replace
 import pytest
 from modems import RUN_INFO, config_of
 
+from comms.said.announcement import Role
 from comms.said.messages import AgentState, Mode, TaskState, TaskStatus
 from modem.presence import ASTRAY_M, REPORT_MS, Presence, seldom_ms
 from planner.types import Strip
@@ -39,6 +40,24 @@ def test_on_a_track_it_goes_straight_on_until_that_ends() -> None:
     assert place(presence, 500_000) == pytest.approx((160.0, 50.0))
     presence.hear_state(replace(SURVEYING, mode=Mode.TRANSIT), 0, 70_000)
     assert place(presence, 500_000) == (100.0, 50.0)
+
+
+def test_a_primary_started_anew_goes_to_a_track_and_not_to_the_strip_of_that_number() -> None:
+    presence = Presence(replace(ALPHA, role=Role.SURVEY_REVISIT))
+    presence.strips[7] = NORTH
+    north = replace(IDLE, heading_rad=0.0)
+    to_seven = replace(north, mode=Mode.TRANSIT, works_on=7)
+    presence.hear_state(to_seven, 0, 0)
+    assert place(presence, 20_000) == (100.0, 0.0)
+    presence.hear_state(replace(north, mode=Mode.FINISHED), 0, 20_000)
+    presence.hear_state(to_seven, 0, 30_000)  # and now it is on its way to the strip
+    assert math.dist(place(presence, 40_000), (100.0, 0.0)) == pytest.approx(15.0, abs=1.0)
+    for said_ms in (60_000, 80_000):
+        presence.hear_state(to_seven, 1, said_ms)
+        assert place(presence, said_ms + 10_000) == (100.0, 0.0)
+    assert presence.hear_status(status(TaskState.ACCEPTED, strip=8), 100_000)  # it has surveyed since
+    presence.hear_state(to_seven, 1, 110_000)
+    assert math.dist(place(presence, 120_000), (100.0, 0.0)) == pytest.approx(15.0, abs=1.0)
 
 
 def test_over_a_strip_it_goes_as_it_was_given() -> None:
