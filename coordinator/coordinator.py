@@ -120,7 +120,7 @@ class Coordinator:
         narrowest = min(helpers, key=lambda one: footprint_of(one.sonar).reach.strip_width_m, default=None)
         p_detect = 0.0 if narrowest is None else narrowest.p_detect
         self._sectors = sectors = Sectors(_sectors(config, fleet, in_reach, p_detect), run.grid.spec, agenda)
-        ledger = Ledger(self._first_number, lambda window: sectors.of(window).number)
+        ledger = Ledger(self._first_number, sectors.number_of)
         self._strips = strips = StripLife(
             ledger, fleet, inside, sectors, outbox, config.answer_within_ms, config.looks_within_ms
         )

@@ -55,7 +55,7 @@ class Ledger:
     """All strips by number, counted from `first_number`, 1 or more. `sector_of`: the number of the sector in which a
     window lies; there is one alone where nothing is said."""
 
-    def __init__(self, first_number: int = 1, sector_of: Callable[[Window], int] = lambda _: 0) -> None:
+    def __init__(self, first_number: int = 1, sector_of: Callable[[Window], int] | None = None) -> None:
         self._first_number = first_number
         self._sector_of = sector_of
         self._open_in = defaultdict[int, set[int]](set)
@@ -93,7 +93,7 @@ class Ledger:
         record = StripRecord(strip, cut, StripState.OPEN, 1, "", now_ms, reason)
         self._records[strip.number] = record
         self._by_state[record.state].add(strip.number)
-        self._open_in[self._sector_of(record.window)].add(strip.number)
+        self._open_beside(record).add(strip.number)
         return record
 
     def revise(self, record: StripRecord, strip: Strip, cut: Cut) -> None:
@@ -102,9 +102,9 @@ class Ledger:
             raise ValueError(f"strip {record.strip.number} is {record.state.value}: only an open one can be revised")
         if strip.number != record.strip.number:
             raise ValueError(f"strip {record.strip.number} cannot be revised as strip {strip.number}")
-        self._open_in[self._sector_of(record.window)].discard(strip.number)
+        self._open_beside(record).discard(strip.number)
         record.strip, record.cut = strip, cut
-        self._open_in[self._sector_of(record.window)].add(strip.number)
+        self._open_beside(record).add(strip.number)
         record.revision += 1
 
     def move(self, record: StripRecord, state: StripState, now_ms: int, reason: str, vehicle: str = "") -> None:
@@ -118,7 +118,7 @@ class Ledger:
         self._by_state[record.state].discard(number)
         self._by_state[state].add(number)
         if StripState.OPEN in (state, record.state):
-            numbers = self._open_in[self._sector_of(record.window)]
+            numbers = self._open_beside(record)
             numbers.add(number) if state is StripState.OPEN else numbers.discard(number)
         if record.state in TAKEN:
             del self._taken(record.state)[record.vehicle]
@@ -159,3 +159,7 @@ class Ledger:
     def open_in(self, sector: int) -> list[StripRecord]:
         """The open strips in a sector, by number."""
         return [self._records[number] for number in sorted(self._open_in[sector])]
+
+    def _open_beside(self, record: StripRecord) -> set[int]:
+        """The numbers of the open strips in the sector in which a strip lies."""
+        return self._open_in[0 if self._sector_of is None else self._sector_of(record.window)]

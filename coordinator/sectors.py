@@ -68,6 +68,10 @@ class Sectors:
         """The one in whose window the middle of another lies."""
         return next(one for one in self.all if one.holds(window))
 
+    def number_of(self, window: Window) -> int:
+        """Its number."""
+        return self.of(window).number
+
     def touched(self, window: Window) -> list[Sector]:
         """Those that share cells with a window."""
         return [one for one in self.all if one.window.shared(window)]

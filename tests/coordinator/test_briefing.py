@@ -51,7 +51,7 @@ class Known:
         self,
         config: CoordinatorConfig = CONFIG,
         keep_out: tuple[Zone, ...] = (),
-        sector_of: Callable[[Window], int] = lambda _: 0,
+        sector_of: Callable[[Window], int] | None = None,
     ) -> None:
         run = replace(run_info(400, 400), keep_out=keep_out)
         self.fleet = KnownFleet(run, config.patience, 0)
