@@ -69,7 +69,7 @@ class Sectors:
         return next(one for one in self.all if one.holds(window))
 
     def number_of(self, window: Window) -> int:
-        """Its number."""
+        """The number of the sector in whose window the middle of another lies."""
         return self.of(window).number
 
     def touched(self, window: Window) -> list[Sector]:

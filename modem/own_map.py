@@ -63,9 +63,8 @@ class OwnMap:
             self._correcting.hear_tile(tile, now_ms)
 
     def hear_state(self, state: AgentState) -> None:
-        """Its vehicle tells at which strip it is, of which this modem may have heard no word, as it was started anew
-        since."""
-        if self._by_strips and state.works_on:
+        """Its vehicle tells at which strip it is: a modem that was started anew since has heard no word of that."""
+        if self._by_strips and state.works_on and not self._held_of:
             self._held_of = state.works_on
 
     def hear_status(self, status: TaskStatus, now_ms: int) -> list[Stretch]:

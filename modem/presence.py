@@ -50,7 +50,7 @@ class Presence:
         self._entry, self._keep_out, self._reckons_ways = entry, keep_out, reckons_ways
         self._state: AgentState | None = None
         self._incarnation = 0
-        self._takes_strips = entry.role is not Role.SURVEY_REVISIT  # that does once it has surveyed
+        self._takes_strips = entry.role is not Role.SURVEY_REVISIT  # which does once it has surveyed
         self._said_ms = 0
         self._sweep: Sweep | None = None  # as it is taken to fly the strip that it works on
         self._way: Way = ()  # and to come there from where it was told
@@ -70,14 +70,14 @@ class Presence:
 
     def hear_status(self, status: TaskStatus, said_ms: int) -> bool:
         """What it says of a task tells of its work, too: returns whether it does."""
+        if status.state in _MODES:
+            self._takes_strips = True
         state = self.at(said_ms)
         if state is None or state.mode.is_out_of_work or state.mode is Mode.HOME:
             return state is None and status.state in (TaskState.ACCEPTED, TaskState.UNDER_WAY)
         told = self._state
         if told is not None and (told.mode, told.works_on) == (_MODES.get(status.state), status.strip):
             return False  # it has said so before, and has gone on since
-        if status.state in _MODES:
-            self._takes_strips = True
         if status.state is TaskState.ACCEPTED:
             self._accept(state, status, said_ms)
         elif status.state is TaskState.UNDER_WAY:
@@ -86,6 +86,8 @@ class Presence:
                 said_ms = self._began_ms(self._sweep, status, said_ms)
             ends_ms = status.ends_ms or state.expected_end_ms
             self._state = replace(state, mode=Mode.REVISIT, works_on=status.strip, expected_end_ms=ends_ms)
+        elif not self._takes_strips:
+            return False  # asked back of it, from before it was started anew: what it works on is a track
         elif status.state not in (TaskState.NEXT, TaskState.REFUSED) and status.strip == state.works_on:
             if self._sweep is not None and status.state is TaskState.DONE:
                 state = _at(state, self._sweep.leave[:2], self._sweep.leave.heading_rad)

@@ -87,7 +87,7 @@ class SurveyAgent(Agent):
         self._rho = run.rho
         window = blocks_about(self._grid, self._inside)
         self._hotspots = HotspotMap.empty(self._grid, window)
-        inside = self._inside[window]
+        inside = self._inside[window]  # what hotspots are made of, as it was when they were looked for last:
         self._hot, self._unsettled, self._risk = np.zeros_like(inside), inside.copy(), np.ones(inside.shape)
         if self.config.prior is not None:
             self._publish_prior(self.config.prior)

@@ -65,7 +65,7 @@ class Plans(NamedTuple):
 class Ahead(NamedTuple):
     """What plans may go on with, shape (plans, strips), or one of them: when the helper is free again, how much of its
     time before the deadline that takes, and what is gained by then beyond what that time is worth, 0 where nothing
-    is."""
+    is; the other two say nothing there."""
 
     ends_s: FloatArray
     spent_s: FloatArray
@@ -229,7 +229,7 @@ def _complete(team: Found, plan: Plans, turn: int) -> int:
 
 @compiled
 def _gone_on(team: Found, plan: Plans, one: int, strip: int) -> tuple[float, float, float]:
-    """What comes of it if a helper goes on with a strip, see `Ahead`."""
+    """What comes of it if a helper goes on with a strip, as in `Ahead`."""
     free_s, found = plan.free_s[one], team.table[one, plan.node[one]]
     begins_s, sweep_s = found[0, strip] + free_s, found[1, strip]
     ends_s = begins_s + sweep_s
@@ -292,10 +292,10 @@ def _rate_m2ps(spent_s: float, gained_m2: float) -> float:
 
 
 @compiled
-def _serve(team: Found, plan: Plans, one: int, strip: int, ends_s: float, gained_m2: float, turn: int) -> None:
-    """A helper serves a strip, as the `turn`th of its plan, and is free again when it ends."""
+def _serve(team: Found, plan: Plans, one: int, strip: int, free_s: float, gained_m2: float, turn: int) -> None:
+    """A helper serves a strip, as the `turn`th of its plan, and is free again at a time."""
     plan.node[one] = team.way[one, plan.node[one], strip]
-    plan.free_s[one] = ends_s
+    plan.free_s[one] = free_s
     plan.turn[strip] = turn * team.free_s.size + one
     plan.gained_m2[0] += gained_m2
 

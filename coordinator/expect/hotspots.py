@@ -11,6 +11,7 @@ from planner.fleet_map import MOST_STARTS
 from planner.region import points_inside
 from planner.types import BoolArray, FloatArray, GridSpec, Window
 
+MOST_CHANGED = 64  # windows that are drawn one by one
 Place = tuple[str, int]
 """A hotspot's vehicle and number."""
 Revision = tuple[int, int]
@@ -55,6 +56,8 @@ class Hotspots:
             window, cells = self._cells_within([(corner.x_m, corner.y_m) for corner in message.outline])
         starts.setdefault(incarnation, {})[number] = _Standing(its_revision, message.mean_risk, window, cells)
         self._changed += [window] if known is None else [known.window, window]
+        if len(self._changed) > MOST_CHANGED:  # nobody asks: who does has all of it drawn
+            self._changed = [(slice(0, self._grid.rows), slice(0, self._grid.columns))]
         if len(starts) > MOST_STARTS:
             oldest = self._closed[vehicle] = min(starts)
             for one in starts.pop(oldest).values():

@@ -60,6 +60,27 @@ def test_a_primary_started_anew_goes_to_a_track_and_not_to_the_strip_of_that_num
     assert math.dist(place(presence, 120_000), (100.0, 0.0)) == pytest.approx(15.0, abs=1.0)
 
 
+@pytest.mark.parametrize("state_first", [True, False])
+def test_a_primary_that_accepts_a_strip_has_surveyed_though_its_end_was_not_heard(state_first: bool) -> None:
+    presence, state = Presence(replace(ALPHA, role=Role.SURVEY_REVISIT)), replace(IDLE, heading_rad=0.0)
+    presence.strips[7] = NORTH
+    to_seven, accepted = replace(state, mode=Mode.TRANSIT, works_on=7), status(TaskState.ACCEPTED)
+    if state_first:
+        presence.hear_state(to_seven, 0, 0)
+    presence.hear_status(accepted, 1000)
+    presence.hear_state(to_seven, 0, 30_000)
+    assert math.dist(place(presence, 40_000), (100.0, 0.0)) == pytest.approx(15.0, abs=1.0)
+
+
+def test_a_strip_that_is_asked_back_of_a_primary_started_anew_says_nothing_of_its_track() -> None:
+    presence = Presence(replace(ALPHA, role=Role.SURVEY_REVISIT))
+    presence.hear_state(replace(SURVEYING, works_on=7), 1, 0)
+    assert not presence.hear_status(status(TaskState.GIVEN_BACK), 1000)
+    known = presence.at(2000)
+    assert known is not None
+    assert (known.mode, known.works_on) == (Mode.SURVEY, 7)
+
+
 def test_over_a_strip_it_goes_as_it_was_given() -> None:
     presence = Presence(BETA)
     presence.strips[7] = NORTH

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from hypothesis import strategies as st
 
 from comms.said.announcement import Vertex
 from comms.said.messages import Hotspot, HotspotState
-from coordinator.expect.hotspots import Hotspots
+from coordinator.expect.hotspots import MOST_CHANGED, Hotspots
 from planner.fleet_map import MOST_STARTS
 
 Box = tuple[float, float, float, float]
@@ -139,18 +140,22 @@ def test_two_hotspots_of_one_start_are_two(hotspots: Hotspots) -> None:
     assert (drawn(hotspots) == told((HOT_CELLS, 0.5), (ELSEWHERE_CELLS, 0.7))).all()
 
 
-@given(st.lists(st.tuples(st.integers(1, 4), st.integers(0, 11), st.booleans()), min_size=1, max_size=12))
+WORDS = st.tuples(st.integers(1, 4), st.integers(0, 11), st.integers(0, 2), st.booleans())
+
+
+@given(st.lists(WORDS, min_size=1, max_size=24), st.sampled_from([3, MOST_CHANGED]))
 def test_asked_in_between_it_has_drawn_what_one_has_that_is_asked_at_the_end(
-    words: list[tuple[int, int, bool]],
+    words: list[tuple[int, int, int, bool]], most_changed: int
 ) -> None:
     everywhere = np.ones(GRID.shape, dtype=np.bool_)
     one, other = Hotspots(GRID, everywhere), Hotspots(GRID, everywhere)
-    for revision, (number, place, asked) in enumerate(words):
+    for revision, (number, place, starts_ago, asked) in enumerate(words):
         x_m, y_m = 50.0 + 40.0 * (place % 4), 60.0 * (place // 4)  # which lie on their neighbours, but for the last
         message = hotspot(None if place == 11 else (x_m, y_m, x_m + 60, y_m + 80), 0.5 + place / 100)
-        # Each third is one of another start, and so one more: of the oldest starts in the end nothing new is heard.
+        # Each is of a start of its own, or of one shortly before: of the oldest starts in the end nothing new is heard.
         for hotspots in (one, other):
-            hotspots.hear(("p", number), (revision // 3, revision), message)
+            with patch("coordinator.expect.hotspots.MOST_CHANGED", most_changed):
+                hotspots.hear(("p", number), (max(0, revision - starts_ago), revision), message)
         if asked:
             drawn(one)
     assert (drawn(one) == drawn(other)).all()
