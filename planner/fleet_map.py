@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from planner.risk import MOST_LEVELS, NATS_PER_LEVEL, LevelArray, residual_risk, risk_of_levels
 from planner.tiles import tile_shape
 from planner.types import EVERYWHERE, BoolArray, FloatArray, GridSpec, Window
+from planner.windows import NOWHERE, around, shared, whole, within
 
 PARTS = 16  # of a level: half of one is less than a thousandth of the residual risk
 MOST_STARTS = 8  # that are told apart, of each tile
@@ -42,7 +43,7 @@ class VehicleLayer:
     sum_levels: LevelArray
     largest_levels: LevelArray
     settled: BoolArray
-    told: Window = (slice(0, 0), slice(0, 0))
+    told: Window = NOWHERE
     versions: dict[Place, dict[int, int]] = field(default_factory=dict)
     _apart: dict[Place, dict[int, _Told]] = field(default_factory=dict)  # where more than one start has told
 
@@ -58,11 +59,7 @@ class VehicleLayer:
     def take(self, place: Place, window: Window, incarnation: int, tile: ToldTile) -> bool:
         """Takes a start's tile, whose cells are the window's; returns whether it was news."""
         if place not in self.versions:
-            rows, columns = (
-                slice(min(held.start, new.start), max(held.stop, new.stop)) if held.stop else new
-                for held, new in zip(self.told, window, strict=True)
-            )
-            self.told = rows, columns
+            self.told = around(self.told, window)
         versions = self.versions.setdefault(place, {})
         oldest = min(versions, default=incarnation)
         if tile.version <= versions.get(incarnation, -1) or (incarnation < oldest and versions[oldest] == CLOSED):
@@ -264,11 +261,8 @@ class FleetMap:
     def _shared(self, window: Window, layers: Iterable[VehicleLayer]) -> Iterator[tuple[VehicleLayer, Window, Window]]:
         """The layers that may have told of some of a window, of a large fleet's few, and what that is, within the
         window and within the map."""
-        (row, end_row, _), (column, end_column, _) = map(slice.indices, window, self.grid.shape)
+        window = whole(window, self.grid.shape)
         for layer in layers:
-            rows, columns = layer.told
-            first, end = max(row, rows.start), min(end_row, rows.stop)
-            left, right = max(column, columns.start), min(end_column, columns.stop)
-            if first < end and left < right:
-                to = slice(first - row, end - row), slice(left - column, right - column)
-                yield layer, to, (slice(first, end), slice(left, right))
+            its = shared(window, layer.told)
+            if its is not None:
+                yield layer, within(its, window), its

@@ -11,6 +11,7 @@ import numpy as np
 from planner.outline import outline as outline_of
 from planner.patches import NumberArray, carried_on
 from planner.types import EVERYWHERE, BoolArray, FloatArray, GridSpec, Point, Window
+from planner.windows import whole, window_about
 
 MOST_VERTICES = 40
 """An outline has no more."""
@@ -54,14 +55,6 @@ def blocks_about(grid: GridSpec, inside: BoolArray, block_m: float = BLOCK_M) ->
         slice(rows.start // block * block, min(-(-rows.stop // block) * block, grid.rows)),
         slice(columns.start // block * block, min(-(-columns.stop // block) * block, grid.columns)),
     )
-
-
-def window_about(cells: BoolArray) -> Window:
-    """The rows and columns that hold all of some cells; none where there is no such cell."""
-    rows, columns = (np.flatnonzero(cells.any(axis=axis)) for axis in (1, 0))
-    if not rows.size:
-        return slice(0, 0), slice(0, 0)
-    return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
 
 
 def _cells_a_block(grid: GridSpec, block_m: float) -> int:
@@ -148,16 +141,17 @@ def update_hotspots(
     if not 0 < block_m < np.inf:
         raise ValueError(f"a block's side must be finite and above 0, not {block_m} m")
     block, least_area_m2 = _cells_a_block(grid, block_m), float(least_area_m2)
-    before, looked_at = previous.made_of, _bounds(part, hot.shape)
+    before = previous.made_of
     if before is None or (before.block, before.least_area_m2) != (block, least_area_m2):
         nothing = np.full(hot.shape, np.nan), np.zeros(hot.shape, dtype=np.bool_)  # which nothing is like
-        before, looked_at = _Cells(*nothing, block, least_area_m2), _bounds(EVERYWHERE, hot.shape)
+        before, part = _Cells(*nothing, block, least_area_m2), EVERYWHERE
+    looked_at = whole(part, hot.shape)
     # No patch reaches from one block into another, so that where nothing is new they are what they were.
     found = carried_on(
         np.ascontiguousarray(hot),
         np.ascontiguousarray(unsettled),
         np.ascontiguousarray(risk, dtype=np.float64),
-        looked_at,
+        (looked_at[0].start, looked_at[0].stop, looked_at[1].start, looked_at[1].stop),
         before.risk,
         before.growing,
         previous.numbers,
@@ -190,14 +184,6 @@ def update_hotspots(
         tuple(sorted(changed, key=lambda hotspot: hotspot.number)),
         withdrawn,
     )
-
-
-def _bounds(window: Window, shape: tuple[int, ...]) -> tuple[int, int, int, int]:
-    """A window's first row, the one behind its last, and so of columns."""
-    (first_row, end_row, _), (first_column, end_column, _) = (
-        one.indices(size) for one, size in zip(window, shape, strict=True)
-    )
-    return first_row, end_row, first_column, end_column
 
 
 def _outline(

@@ -6,7 +6,6 @@ decided on, is in whole levels of 0.02, so that everyone sees one map.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 
 from planner.compiled import compiled
 from planner.types import EVERYWHERE, BoolArray, FloatArray, GridSpec, Window
+from planner.windows import NOWHERE, around, shared, whole, within
 
 NATS_PER_LEVEL = 0.02
 MOST_LEVELS = 255
@@ -37,7 +37,7 @@ class RiskLayer:
     def __init__(self, grid: GridSpec) -> None:
         self.sum_levels: LevelArray = np.zeros(grid.shape, dtype=np.uint8)
         self.largest_levels: LevelArray = np.zeros(grid.shape, dtype=np.uint8)
-        self._part: Window = (slice(0, 0), slice(0, 0))
+        self._part = NOWHERE
         self._nats: FloatArray = np.zeros((2, 0, 0))  # of the part: sums, and the largest single looks
 
     def add_look(self, rows: slice, columns: slice, p_detect: FloatArray) -> None:
@@ -45,14 +45,14 @@ class RiskLayer:
 
         Raises ValueError for P_d outside [0, 0.999], or not as many as the window has cells.
         """
-        rows, columns = self._bounds((rows, columns))
+        rows, columns = whole((rows, columns), self.sum_levels.shape)
         if p_detect.shape != (rows.stop - rows.start, columns.stop - columns.start):
             raise ValueError(f"a look of {p_detect.shape} cells in another window")
         if not p_detect.size:
             return
         if not (float(p_detect.min()) >= 0.0 and float(p_detect.max()) <= HIGHEST_P_DETECT):
             raise ValueError(f"P_d outside 0 to {HIGHEST_P_DETECT}")
-        self._hold(rows, columns)
+        self._hold((rows, columns))
         begin, held_from = ((window[0].start, window[1].start) for window in ((rows, columns), self._part))
         nats = np.ascontiguousarray(-np.log1p(-p_detect))
         _add(nats, begin, self._nats, held_from, self.sum_levels, self.largest_levels)
@@ -60,38 +60,22 @@ class RiskLayer:
     def nats(self, window: Window = EVERYWHERE) -> FloatArray:
         """-ln(1 - P_d) of a window's cells, summed over looks, and of the largest single ones, shape (2, rows,
         columns)."""
-        rows, columns = self._bounds(window)
+        rows, columns = window = whole(window, self.sum_levels.shape)
         found: FloatArray = np.zeros((2, rows.stop - rows.start, columns.stop - columns.start))
-        shared = [
-            slice(max(here.start, part.start), min(here.stop, part.stop))
-            for here, part in zip((rows, columns), self._part, strict=True)
-        ]
-        if all(one.start < one.stop for one in shared):
-            found[:, *_from(shared, (rows, columns))] = self._nats[:, *_from(shared, self._part)]
+        held = shared(window, self._part)
+        if held is not None:
+            found[:, *within(held, window)] = self._nats[:, *within(held, self._part)]
         return found
 
-    def _bounds(self, window: Window) -> Window:
-        """The window by its first cells and those behind its last."""
-        rows, columns = (slice(*one.indices(size)[:2]) for one, size in zip(window, self.sum_levels.shape, strict=True))
-        return rows, columns
-
-    def _hold(self, rows: slice, columns: slice) -> None:
+    def _hold(self, window: Window) -> None:
         """Holds the nats of a window, too."""
-        part = [
-            (min(held.start, here.start), max(held.stop, here.stop)) if held.stop else (here.start, here.stop)
-            for held, here in zip(self._part, (rows, columns), strict=True)
-        ]
-        if part != [(held.start, held.stop) for held in self._part]:
-            larger = [
-                slice(first - first % BLOCK, min(end + -end % BLOCK, size))
-                for (first, end), size in zip(part, self.sum_levels.shape, strict=True)
-            ]
-            self._nats, self._part = self.nats((larger[0], larger[1])), (larger[0], larger[1])
-
-
-def _from(window: Sequence[slice], part: Window) -> list[slice]:
-    """A window of the grid as one of a part of it."""
-    return [slice(one.start - of.start, one.stop - of.start) for one, of in zip(window, part, strict=True)]
+        part = around(self._part, window)
+        if part != self._part:
+            rows, columns = (
+                slice(one.start - one.start % BLOCK, min(one.stop + -one.stop % BLOCK, size))
+                for one, size in zip(part, self.sum_levels.shape, strict=True)
+            )
+            self._nats, self._part = self.nats((rows, columns)), (rows, columns)
 
 
 def to_levels(nats: FloatArray) -> LevelArray:

@@ -11,7 +11,8 @@ from comms.said.topics import COVERAGE
 from planner.footprints.cells import look_on_grid, over_cells
 from planner.risk import RiskLayer
 from planner.tiles import Tile, tiles, tiles_about, tiles_holding, tiles_within
-from planner.types import BoolArray, GridSpec, Strip, Window
+from planner.types import BoolArray, GridSpec, Strip
+from planner.windows import NOWHERE
 
 MOST_AGAIN = 200  # tiles that are said again at one time, as somebody asks
 OFTEN_ENOUGH = 8  # times that a tile is said: where a fifth of all words is lost, 3 of 1,000,000 tiles stay unheard
@@ -33,7 +34,7 @@ class CoverageLayer:
         self._best_counts = rho > 0.0
         self.layer = RiskLayer(grid)
         self.settled: BoolArray = np.zeros(grid.shape, dtype=np.bool_)
-        self.newest: Window = slice(0, 0), slice(0, 0)
+        self.newest = NOWHERE
         self._vehicle = vehicle
         self._version = 0
         self._versions_told = 0  # the sum of the newest of all tiles

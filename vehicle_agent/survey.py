@@ -29,12 +29,13 @@ from planner.first_plan import parts_in_order
 from planner.flyable import flyable_pieces
 from planner.footprints.cells import Ahead, cells_within, settled_cells
 from planner.footprints.footprint import Reach
-from planner.hotspots import HotspotMap, blocks_about, update_hotspots, window_about
+from planner.hotspots import HotspotMap, blocks_about, update_hotspots
 from planner.profile_spacing import Known, SpacingTerms, known_before
 from planner.risk import HIGHEST_P_DETECT, residual_risk
 from planner.spacing_planners import SpacingDecision
 from planner.sweep import Pass, pass_over
 from planner.types import BoolArray, DetectionCurve, FloatArray, Track, Window
+from planner.windows import window_about
 from vehicle_agent.agent import Agent
 from vehicle_agent.config import WHOLE, SurveyConfig
 from vehicle_agent.helpers_ahead import helper_looks
@@ -87,8 +88,8 @@ class SurveyAgent(Agent):
         self._rho = run.rho
         window = blocks_about(self._grid, self._inside)
         self._hotspots = HotspotMap.empty(self._grid, window)
-        inside = self._inside[window]  # what hotspots are made of, as it was when they were looked for last:
-        self._hot, self._unsettled, self._risk = np.zeros_like(inside), inside.copy(), np.ones(inside.shape)
+        shape = self._inside[window].shape  # of what hotspots were made of when they were looked for last:
+        self._hot, self._risk = np.zeros(shape, dtype=np.bool_), np.ones(shape)
         if self.config.prior is not None:
             self._publish_prior(self.config.prior)
         sonar, begin = (self.config.nadir_gap_m, self.config.range_m), self.config.begin
@@ -393,8 +394,8 @@ class SurveyAgent(Agent):
         part, layer, settled = window_about(changed[window]), self.coverage.layer, self.coverage.settled[window]
         risk = residual_risk(layer.sum_levels[window][part], layer.largest_levels[window][part], self._rho)
         self._risk[part], self._hot[part] = risk, settled[part] & (risk >= self.config.hotspot_risk)
-        self._unsettled[part] = self._inside[window][part] & ~settled[part]
-        update = update_hotspots(self._grid, self._hot, self._unsettled, self._risk, self._hotspots, part=part)
+        unsettled = self._inside[window] & ~settled
+        update = update_hotspots(self._grid, self._hot, unsettled, self._risk, self._hotspots, part=part)
         self._hotspots = update.map
         for hotspot in update.changed:
             outline = tuple(Vertex(x_m, y_m) for x_m, y_m in hotspot.outline)

@@ -10,6 +10,7 @@ from comms.said.messages import Hotspot, HotspotState
 from planner.fleet_map import MOST_STARTS
 from planner.region import points_inside
 from planner.types import BoolArray, FloatArray, GridSpec, Window
+from planner.windows import NOWHERE, shared
 
 MOST_CHANGED = 64  # windows that are drawn one by one
 Place = tuple[str, int]
@@ -51,7 +52,7 @@ class Hotspots:
         known = starts.get(incarnation, {}).get(number)
         if incarnation <= self._closed.get(vehicle, -1) or (known is not None and its_revision <= known.revision):
             return False
-        window, cells = (slice(0, 0), slice(0, 0)), np.zeros((0, 0), dtype=np.bool_)
+        window, cells = NOWHERE, np.zeros((0, 0), dtype=np.bool_)
         if message.state is HotspotState.ACTIVE and len(message.outline) >= 3:
             window, cells = self._cells_within([(corner.x_m, corner.y_m) for corner in message.outline])
         starts.setdefault(incarnation, {})[number] = _Standing(its_revision, message.mean_risk, window, cells)
@@ -80,7 +81,7 @@ class Hotspots:
         for starts in self._starts.values():
             for hotspots in starts.values():
                 for one in hotspots.values():
-                    if any(_overlap(one.window, window) for window in changed):
+                    if any(shared(one.window, window) for window in changed):
                         _draw(one, self._hot, self._told_risk)
 
     def _cells_within(self, outline: list[tuple[float, float]]) -> tuple[Window, BoolArray]:
@@ -90,7 +91,7 @@ class Hotspots:
         across, along = grid.frame.to_sweep(corners[:, 0], corners[:, 1])
         columns, rows = _from_first_to_last(grid.across_m, across), _from_first_to_last(grid.along_m, along)
         if columns.start == columns.stop or rows.start == rows.stop:
-            return (slice(0, 0), slice(0, 0)), np.zeros((0, 0), dtype=np.bool_)
+            return NOWHERE, np.zeros((0, 0), dtype=np.bool_)
         within = points_inside(across, along, grid.across_m[columns], grid.along_m[rows])
         return (rows, columns), within & self._inside[rows, columns]
 
@@ -98,14 +99,6 @@ class Hotspots:
 def _draw(one: _Standing, hot: BoolArray, told_risk: FloatArray) -> None:
     hot[one.window] |= one.cells
     np.maximum(told_risk[one.window], one.mean_risk, out=told_risk[one.window], where=one.cells)
-
-
-def _overlap(one: Window, other: Window) -> bool:
-    """Whether two windows share cells."""
-    (rows, columns), (its_rows, its_columns) = one, other
-    if rows.stop <= its_rows.start or its_rows.stop <= rows.start:
-        return False
-    return bool(columns.start < its_columns.stop and its_columns.start < columns.stop)
 
 
 def _from_first_to_last(centres_m: FloatArray, corners_m: FloatArray) -> slice:

@@ -12,7 +12,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planner.hotspots import Hotspot, HotspotMap, HotspotUpdate, blocks_about, update_hotspots, window_about
+from planner.hotspots import Hotspot, HotspotMap, HotspotUpdate, blocks_about, update_hotspots
 from planner.types import EVERYWHERE, BoolArray, FloatArray, GridSpec, Point, SweepFrame
 
 GRID = GridSpec(SweepFrame(100, 200, 0), 5, columns=12, rows=6)
@@ -432,13 +432,6 @@ class TestWindows:
             of_all, of_part = all_of_it.map, some.map
             assert of_part.hotspots == of_all.hotspots
             assert (of_part.numbers == of_all.numbers).all()
-
-
-def test_the_rows_and_columns_that_hold_some_cells() -> None:
-    cells = NONE.copy()
-    assert window_about(cells) == (slice(0, 0), slice(0, 0))
-    cells[3, 7] = cells[5, 2] = True
-    assert window_about(cells) == (slice(3, 6), slice(2, 8))
 
 
 class TestRefusals:
