@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 
 import pytest
+from along_a_track import LOOKS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from modems import RUN_INFO, Waters, config_of
@@ -109,6 +110,18 @@ def test_what_was_seen_of_a_strip_that_is_done_follows_from_the_strip() -> None:
     nats = sum(float(tile.sum_levels.sum()) for tile in tiles)
     a_cell = round(-math.log1p(-0.7) / 0.02)
     assert nats == pytest.approx(a_cell * 180 * 50 / 25, rel=0.1)  # 25 m to either side, of cells of 25 m2
+
+
+def test_what_was_seen_of_a_strip_that_is_not_done_is_said_though_its_modem_heard_no_word_that_it_began() -> None:
+    waters = small_waters(reports=True)
+    waters.say("beta", "agent/beta/state", replace(IDLE, mode=Mode.REVISIT, works_on=7))
+    for look in LOOKS[:5]:
+        waters.say("world", "veh/beta/look", look)
+    waters.run(3 * CYCLE_MS)
+    assert told(waters, "ship", CoverageTile) == []
+    waters.say("beta", "agent/beta/task_status/1", replace(DONE, state=TaskState.FAILED))
+    waters.run(20 * CYCLE_MS)
+    assert told(waters, "ship", CoverageTile)
 
 
 def test_a_helper_is_taken_to_be_where_its_strip_ends() -> None:
