@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,8 +13,9 @@ from coordinator.allocate.routes import plan_each
 from coordinator.allocate.situation import HORIZON_S, Situation
 from coordinator.briefing import Briefing
 from coordinator.config import CoordinatorConfig
-from coordinator.cut.cutter import Cutter, Flown
+from coordinator.cut.cutter import Cutter, Flown, FlownRoutes
 from coordinator.cut.ground import OBJECTIVES, Ground
+from coordinator.cut.legs import Flier
 from coordinator.cut.room import Room
 from coordinator.cut.strips import Counted, Cut, CuttingRules
 from coordinator.expect.contacts import KnownContacts
@@ -61,6 +62,7 @@ class StripCutting:
             min_strip_m=config.min_strip_m,
             max_strip_m=config.max_strip_m,
         )
+        self._lays = getattr(config.allocator, "lays_strips", False) is True
         self._objective = OBJECTIVES[config.objective]
         grid = sector.expected.grid
         area_m2 = grid.cell_area_m2
@@ -86,15 +88,35 @@ class StripCutting:
         helpers, grid = situation.helpers, self._grid
         deadline_s = min(situation.deadline_s, situation.now_s + HORIZON_S)
 
-        def flown(choices: Sequence[Sequence[Counted]]) -> Sequence[Mapping[int, float]]:
+        def flown(choices: Sequence[Sequence[Counted]]) -> Sequence[FlownRoutes]:
             if not helpers:
-                return [dict.fromkeys(range(len(cuts)), 1.0) for cuts in choices]
+                return [FlownRoutes(dict.fromkeys(range(len(cuts)), 1.0), ()) for cuts in choices]
             as_open = self._briefing.as_open
             strips = [[as_open(cut.strip(grid, place), cut) for place, cut in enumerate(cuts)] for cuts in choices]
             found = plan_each([(some, helpers) for some in strips], deadline_s, COMPARED_BEAM)
-            return [routes.shares for routes in found]
+            return [FlownRoutes(its.shares, [its.strips[one.vehicle] for one in helpers]) for its in found]
 
         return flown
+
+    def _fliers(self, situation: Situation) -> list[Flier]:
+        """By whose routes strips are laid before one is offered: none while nobody is to be sent to one, nor where ways
+        are not Dubins's: they are laid by these."""
+        is_plain = all(not one.keep_out and one.sailing.is_in_still_water for one in situation.helpers)
+        if not (self._lays and situation.free and is_plain) or situation.soonest:
+            return []
+        frame, deadline_s = self._grid.frame, min(situation.deadline_s, situation.now_s + HORIZON_S)
+        return [
+            Flier(
+                *frame.to_sweep(one.free_at.x_m, one.free_at.y_m),
+                one.free_at.heading_rad - frame.heading_rad,
+                one.free_s,
+                min(one.lasts_until_s, deadline_s),
+                one.speed_mps,
+                one.turn_radius_m,
+                one.run_in_m,
+            )
+            for one in situation.helpers
+        ]
 
     def cut(self, now_ms: int, *, again: bool = False) -> None:
         """Cuts anew, and opens, revises and withdraws strips by that; `again`: also a second one on a place that is
@@ -132,7 +154,7 @@ class StripCutting:
         opened = [record.window.within(place) for record in unmatched]
         situation = self._briefing.situation(now_ms, sector)
         time_m, flown = self._briefing.time_m(situation, sector), self._flown(situation)
-        cuts = self._cutter.cut(ground, time_m, claimed, opened, flown, again=again)
+        cuts = self._cutter.cut(ground, time_m, claimed, opened, flown, self._fliers(situation), again=again)
         sector.price, sector.is_worth, sector.present = self._cutter.price, bool(cuts), len(situation.helpers)
         self._goal.hear_expected(sector.number, *self._cutter.leaves_m2)
         for found in cuts:

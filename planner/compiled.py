@@ -2,13 +2,14 @@
 they work on.
 
 A compiled function is written in the part of Python that numba knows: numbers, arrays, tuples of them, and compiled
-functions of its own file. Not compiled it does the same, a hundred times slower: with NUMBA_DISABLE_JIT=1 in the
+functions. Not compiled it does the same, a hundred times slower: with NUMBA_DISABLE_JIT=1 in the
 environment, so that a debugger sees into it.
 """
 
 from __future__ import annotations
 
 import contextlib
+import os
 from collections.abc import Callable
 from functools import cached_property, update_wrapper
 from typing import Any, Generic, ParamSpec, TypeVar
@@ -21,8 +22,8 @@ class Compiled(Generic[P, R]):
     """A function that is compiled as it is first called, for the types of what it is given.
 
     What comes of it is kept on disk, beside the source or, where that cannot be written to, in the user's cache, until
-    the file changes. So it may not call compiled functions of another file, which may change without that. numba itself
-    is imported with the first call: who never makes one does not wait for it.
+    its file changes, or one from which that imports compiled functions. So of other files it may use nothing: numbers,
+    too, are compiled into it. numba itself is imported with the first call: who never makes one does not wait for it.
     """
 
     def __init__(self, function: Callable[P, R]) -> None:
@@ -80,11 +81,17 @@ def _type_of(one: Compiled[..., Any], _: Any) -> Any:
 
 
 def _cache(function: Callable[..., Any]) -> Any:
-    """Keeps what is compiled of a function as numba does. But what another version of ours has left there, and cannot
-    be read any more, is forgotten, and on a full disk nothing is kept."""
+    """Keeps what is compiled of a function as numba does, but only while all of `_sources` are as they were. What
+    another version of ours has left there, and cannot be read any more, is forgotten, and on a full disk nothing is
+    kept."""
     from numba.core.caching import FunctionCache  # noqa: PLC0415, see the class
 
     class Cache(FunctionCache):  # type: ignore[misc]
+        def __init__(self, function: Callable[..., Any]) -> None:
+            super().__init__(function)
+            stats = map(os.stat, _sources(function))
+            self._cache_file._source_stamp = [(stat.st_mtime, stat.st_size) for stat in stats]
+
         def load_overload(self, *what: Any) -> Any:
             try:
                 return super().load_overload(*what)
@@ -97,3 +104,14 @@ def _cache(function: Callable[..., Any]) -> Any:
                 super().save_overload(*what)
 
     return Cache(function)
+
+
+def _sources(function: Callable[..., Any]) -> list[str]:
+    """A function's file, those from which it imports compiled functions, those from which these do, and so on."""
+    found, files = [function], [function.__code__.co_filename]
+    for one in found:
+        for other in one.__globals__.values():
+            if isinstance(other, Compiled) and other._function.__code__.co_filename not in files:
+                found.append(other._function)
+                files.append(other._function.__code__.co_filename)
+    return files

@@ -189,13 +189,10 @@ def path_lengths_m(starts: FloatArray, ends: FloatArray, turn_radius_m: float) -
 @compiled
 def _lengths_m(starts: FloatArray, ends: FloatArray, turn_radius_m: float) -> FloatArray:
     lengths_m = np.empty((len(starts), len(ends)))
-    from_here, to_there = _in_radii(starts, turn_radius_m), _in_radii(ends, turn_radius_m)
+    from_here, to_there = in_radii(starts, turn_radius_m), in_radii(ends, turn_radius_m)
     for row in range(len(starts)):
         for column in range(len(ends)):
-            to_port = _length(from_here[row], to_there[column], -1.0)
-            to_starboard = _length(from_here[row], to_there[column], 1.0)
-            is_shorter = to_starboard < to_port - TIE_M / turn_radius_m
-            lengths_m[row, column] = (to_starboard if is_shorter else to_port) * turn_radius_m
+            lengths_m[row, column] = path_length_m(from_here[row], to_there[column], turn_radius_m)
     return lengths_m
 
 
@@ -203,9 +200,17 @@ _lengths_m.called_with(lambda: (np.zeros((1, 3)), np.zeros((1, 3)), 1.0))
 
 
 @compiled
-def _in_radii(poses: FloatArray, turn_radius_m: float) -> FloatArray:
-    """Of each pose where it is in turn radii, the heading counterclockwise from east, and the compass heading's cosine
-    and sine."""
+def path_length_m(start: FloatArray, end: FloatArray, turn_radius_m: float) -> float:
+    """The same of one path, for compiled functions: from pose to pose as `in_radii` tells them."""
+    to_port, to_starboard = _length(start, end, -1.0), _length(start, end, 1.0)
+    is_shorter = to_starboard < to_port - TIE_M / turn_radius_m
+    return (to_starboard if is_shorter else to_port) * turn_radius_m
+
+
+@compiled
+def in_radii(poses: FloatArray, turn_radius_m: float) -> FloatArray:
+    """Of each pose, shape (n, 3), where it is in turn radii, the heading counterclockwise from east, and the compass
+    heading's cosine and sine, shape (n, 5)."""
     found = np.empty((len(poses), 5))
     for row in range(len(poses)):
         heading_rad = poses[row, 2]
@@ -221,7 +226,7 @@ def _in_radii(poses: FloatArray, turn_radius_m: float) -> FloatArray:
 @compiled
 def _length(start: FloatArray, end: FloatArray, side: float) -> float:
     """The shortest that begins with a turn to a side, -1 for to port and 1 for to starboard, in turn radii, of poses as
-    `_in_radii` tells them."""
+    `in_radii` tells them."""
     x, y, alpha, cos, sin = start[0], start[1], start[2], start[3], start[4]
     end_x, end_y, beta, end_cos, end_sin = end[0], end[1], end[2], end[3], end[4]
     from_x, from_y = x + side * cos, y - side * sin

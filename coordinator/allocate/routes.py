@@ -84,6 +84,14 @@ class RoutesAllocator:
         return offers
 
 
+@dataclass(frozen=True)
+class LaidRoutesAllocator(RoutesAllocator):
+    """The same, and strips are laid for its routes before one is offered, see `coordinator.cut.laying`, so that less is
+    left. In a scenario it is `coordinator.allocate.routes:LaidRoutesAllocator`."""
+
+    lays_strips: bool = True
+
+
 def _to_idle(situation: Situation, offers: Mapping[str, int]) -> Mapping[str, int]:
     """What is offered to free helpers whose routes are empty, as better ones would serve all in time: what those are
     sent to later. Nobody waits while anything is worth looking at."""

@@ -113,7 +113,12 @@ class Situation:
 
 
 class Allocator(Protocol):
-    """Decides offers. Pure: the same situation gives the same answer."""
+    """Decides offers. Pure: the same situation gives the same answer.
+
+    One that plans routes over the open strips, and offers these one after the other, may say so by an attribute
+    `lays_strips`, True: strips are then laid for the best routes over them before one is offered, see
+    `coordinator.cut.laying`.
+    """
 
     def assign(self, situation: Situation) -> Mapping[str, int]:
         """The number of an open strip for each helper that is to be sent to one; each strip at most once.

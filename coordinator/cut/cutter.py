@@ -2,15 +2,19 @@
 
 They are cut along the tracks, where bands lie that were seen badly, and, where they may be, again across them, where
 there is often room for longer ones and fewer turns. Those are chosen that leave less when helpers have flown the best
-of them.
+of them. Before one is offered, those that helpers have routes over are laid for these routes, see
+`coordinator.cut.laying`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 from coordinator.cut.ground import Ground
+from coordinator.cut.laying import Laying
+from coordinator.cut.legs import Flier
 from coordinator.cut.room import Room
 from coordinator.cut.strips import Counted, Cut, Cutting, CuttingRules, cells_wide
 from coordinator.cut.window import Window
@@ -18,11 +22,30 @@ from planner.types import GridSpec
 
 STAYS_FOR = 0.005  # share of what strips remove by which those cut anew must be better than those that are open
 TURNS_FOR = 0.02  # and by which those of the other heading must, as what is expected changes from one cut to the next
+LAID_FOR = 0.01  # and by which those must that are laid anew, of what the routes over them remove
 BLOCKS_A_SWATH = 5  # cells are taken together in blocks, of which at least so many make a swath
 
-Flown = Callable[[Sequence[Sequence[Counted]]], Sequence[Mapping[int, float]]]
-"""Tells how far helpers come in time with each of several choices of strips: by a strip's place in its choice the share
-that they fly of it, if any."""
+
+class FlownRoutes(NamedTuple):
+    """What helpers fly of a choice of strips: by a strip's place in its choice the share that they fly of it in time,
+    and of each helper the places of those that it serves, in order."""
+
+    shares: Mapping[int, float]
+    routes: Sequence[Sequence[int]]
+
+
+Flown = Callable[[Sequence[Sequence[Counted]]], Sequence[FlownRoutes]]
+"""Tells what helpers fly of each of several choices of strips."""
+
+
+class _Outcome(NamedTuple):
+    """`after`: the ground as helpers leave it; `left_m2`: what is left of the objective, with what the metres flown
+    cost at least; the others: see `FlownRoutes`."""
+
+    after: Ground
+    left_m2: float
+    shares: Mapping[int, float]
+    routes: Sequence[Sequence[int]]
 
 
 class Cutter:
@@ -47,6 +70,7 @@ class Cutter:
         self._block = _block(cells_wide(grid, rules.swath_m))
         least_price = least_worth * rules.swath_m / grid.cell_area_m2
         blocks = replace(grid, cell_m=grid.cell_m * self._block)
+        self._laying = Laying(blocks, grid.cell_m / 2, rules.min_strip_m, rules.max_strip_m)
         headings = (False, True) if across else (False,)
         self._ways = [OneHeading(blocks, rules, least_price, across=way) for way in headings]
         self._kept = self._ways[0]
@@ -69,6 +93,7 @@ class Cutter:
         claimed: Sequence[Window],
         opened: Sequence[Window],
         flown: Flown,
+        fliers: Sequence[Flier] = (),
         *,
         again: bool = False,
     ) -> list[Cut]:
@@ -76,9 +101,10 @@ class Cutter:
         tell.
 
         `claimed`: windows that are with a vehicle. `opened`: those of the open strips, which stay where they are if
-        what is cut anew is hardly better. Where there is time for it places are worth several looks; of strips that lie
-        on one another by three quarters only the first is told, as its place is cut again once that is under way, or
-        all are with `again`.
+        what is cut anew is hardly better. `fliers`: the helpers by whose routes strips are laid, in the order of these;
+        none where strips stay as they are cut. Where there is time for it places are worth several looks; of strips
+        that lie on one another by three quarters only the first is told, as its place is cut again once that is under
+        way, or all are with `again`.
         """
         in_cells, left = ground.copy(), ground.in_blocks(self._block)
         for window in claimed:
@@ -86,7 +112,7 @@ class Cutter:
             left.fly(window.in_blocks(self._block))
         best, after = [window.in_blocks(self._block) for window in opened], left
         if time_m > 0:  # else nobody can be sent any more, and what is open is left as it is
-            best, after = self._best(left, time_m, best, flown)
+            best, after = self._best(left, time_m, best, flown, fliers)
         self.threshold, self.leaves_m2 = after.worst_from(), after.left_of_goal_m2()
         told = list[Window]()
         for window in best:
@@ -94,7 +120,9 @@ class Cutter:
                 told.append(window)
         return self._cuts(in_cells, [one.in_cells(self._block, self._shape) for one in told])
 
-    def _best(self, left: Ground, time_m: float, opened: Sequence[Window], flown: Flown) -> tuple[list[Window], Ground]:
+    def _best(
+        self, left: Ground, time_m: float, opened: Sequence[Window], flown: Flown, fliers: Sequence[Flier]
+    ) -> tuple[list[Window], Ground]:
         """The windows by which helpers leave least, those of the open strips or some cut anew, and the ground as they
         leave it."""
         stay, kept = _counted(left, opened, self._kept.least_m2), self._kept
@@ -102,15 +130,32 @@ class Cutter:
         self._searches += 1
         ways = self._ways if turns else [kept]
         cuts_anew = [self._anew(left, way.windows(left, time_m)) for way in ways]
-        before_m2, leaves = left.left_m2(), self._flown(left, [stay, *cuts_anew], flown)
-        best, (after, rest_m2) = stay, leaves[stay]
-        most_m2 = (before_m2 - rest_m2) * (1.0 + TURNS_FOR) * (1.0 + STAYS_FOR)
+        before_m2, outcomes = left.left_m2(), self._flown(left, [stay, *cuts_anew], flown)
+        best, most_m2 = stay, (before_m2 - outcomes[stay].left_m2) * (1.0 + TURNS_FOR) * (1.0 + STAYS_FOR)
         for way, anew in zip(ways, cuts_anew, strict=True):
-            after_anew, rest_m2 = leaves[anew]
-            gained_m2 = (before_m2 - rest_m2) * (1.0 + TURNS_FOR if way is kept else 1.0)
+            gained_m2 = (before_m2 - outcomes[anew].left_m2) * (1.0 + TURNS_FOR if way is kept else 1.0)
             if gained_m2 > most_m2 or not best:
-                most_m2, best, after, self._kept = gained_m2, anew, after_anew, way
-        return [one.window for one in best], after
+                most_m2, best, self._kept = gained_m2, anew, way
+        windows, after = [one.window for one in best], outcomes[best].after
+        if best and fliers:
+            others = dict.fromkeys([*windows, *(one.window for anew in cuts_anew for one in anew)])
+            return self._laid(left, windows, outcomes[best], [*others], fliers)
+        return windows, after
+
+    def _laid(
+        self, left: Ground, best: list[Window], flown: _Outcome, others: Sequence[Window], fliers: Sequence[Flier]
+    ) -> tuple[list[Window], Ground]:
+        """The same as they are laid for the routes over them, and behind them those over which none goes, if that is
+        better by enough. `others`: what may be among them."""
+        routes = [[best[place] for place in route] for route in flown.routes]
+        ground = replace(left, threshold=flown.after.worst_from())
+        found, better = self._laying.laid(ground, routes, others, fliers, self._searches)
+        if better <= LAID_FOR:
+            return best, flown.after
+        after = left.copy()
+        after.fly_each(found)
+        spare = [window for place, window in enumerate(best) if place not in flown.shares]
+        return [one.window for one in _counted(left, [*found, *spare], self._kept.least_m2)], after
 
     def _anew(self, ground: Ground, windows: Sequence[Window]) -> tuple[Counted, ...]:
         """What windows that are cut anew count, as far as they can be flown."""
@@ -118,22 +163,21 @@ class Cutter:
 
     def _flown(
         self, ground: Ground, choices: Iterable[tuple[Counted, ...]], flown: Flown
-    ) -> dict[tuple[Counted, ...], tuple[Ground, float]]:
-        """The ground as helpers leave it that fly each of some choices of windows by the best routes, and what is left
-        of the objective with what their metres cost at least."""
-        leaves = dict[tuple[Counted, ...], tuple[Ground, float]]()
+    ) -> dict[tuple[Counted, ...], _Outcome]:
+        """What comes of it if helpers fly each of some choices of windows by the best routes."""
+        outcomes = dict[tuple[Counted, ...], _Outcome]()
         differ = list(dict.fromkeys(choices))
         in_cells = [
             [Counted(one.window.in_cells(self._block, self._shape), one.counts_m2) for one in choice]
             for choice in differ
         ]
-        for choice, shares in zip(differ, flown(in_cells), strict=True):
+        for choice, (shares, routes) in zip(differ, flown(in_cells), strict=True):
             after, windows, least_m2 = ground.copy(), [choice[place].window for place in shares], 0.0
             after.fly_each(windows, list(shares.values()))
             for window, share in zip(windows, shares.values(), strict=True):
                 least_m2 += share * self._kept.least_m2(window)
-            leaves[choice] = after, after.left_m2() + least_m2
-        return leaves
+            outcomes[choice] = _Outcome(after, after.left_m2() + least_m2, shares, routes)
+        return outcomes
 
     def _cuts(self, ground: Ground, windows: Sequence[Window]) -> list[Cut]:
         """What windows of cells bring if they are flown one after the other."""

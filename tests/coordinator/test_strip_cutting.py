@@ -25,8 +25,11 @@ from one_node import OneNode
 
 from comms.said.announcement import Role, RunInfo, Vertex, Zone
 from comms.said.messages import Contact, Mode, TaskAction, TaskState
+from coordinator.allocate.routes import LaidRoutesAllocator, RoutesAllocator
+from coordinator.allocate.simple import GreedyAllocator
 from coordinator.coordinator import Coordinator
 from coordinator.cut.cutter import Cutter
+from coordinator.cut.legs import Flier
 from coordinator.cut.strips import CuttingRules
 
 
@@ -66,6 +69,41 @@ def test_where_there_is_ground_to_keep_out_of_strips_are_cut_so_that_the_helper_
     assert room is not None
     assert (room.grid, room.helper, room.min_strip_m) == (GRID, FLEET[1], 30)
     assert len(room.keep_out.zones) == 1
+
+
+class TestByWhoseRoutesStripsAreLaid:
+    @staticmethod
+    def fliers(node: Coordinator, mode: Mode = Mode.IDLE, *, soonest: bool = False) -> list[Flier]:
+        told = Told(OneNode(node, Role.COORDINATOR))
+        told.state(HELPER, mode)
+        sector = node._sectors.all[0]
+        situation = node._briefing.situation(5_000, sector)
+        return node._cutting[0]._fliers(replace(situation, soonest=soonest, deadline_s=900.0))
+
+    def test_those_of_the_helpers_in_the_grids_own_frame_until_the_deadline(self) -> None:
+        node = told_of_run(allocator=LaidRoutesAllocator())
+        (flier,) = self.fliers(node)
+        state = node.fleet.vehicles[HELPER].state
+        assert state is not None
+        across_m, along_m = GRID.frame.to_sweep(state.x_m, state.y_m)
+        assert flier[:3] == pytest.approx((across_m, along_m, state.heading_rad - GRID.frame.heading_rad))
+        assert flier[3:5] == (5.0, 900.0)
+        entry = FLEET[1]
+        assert flier[5:] == (entry.speed_mps, entry.turn_radius_m, entry.run_in_m)
+
+    def test_nobodys_while_nobody_is_to_be_sent_to_a_strip_or_where_what_is_worth_most_is_to_be_removed_first(
+        self,
+    ) -> None:
+        assert self.fliers(told_of_run(allocator=LaidRoutesAllocator()), Mode.SURVEY) == []
+        assert self.fliers(told_of_run(allocator=LaidRoutesAllocator()), soonest=True) == []
+
+    def test_nobodys_where_the_allocator_does_not_say_so(self) -> None:
+        assert self.fliers(told_of_run(allocator=GreedyAllocator())) == []
+        assert self.fliers(told_of_run(allocator=RoutesAllocator())) == []
+
+    def test_nobodys_where_there_is_ground_to_keep_out_of(self) -> None:
+        zone = Zone((Vertex(10, 10), Vertex(20, 10), Vertex(20, 30)))
+        assert self.fliers(told_of_run(replace(RUN, keep_out=(zone,)), allocator=LaidRoutesAllocator())) == []
 
 
 @pytest.mark.parametrize(("sectors", "turns_each"), [(1, 1), (3, 3), (6, 4)])

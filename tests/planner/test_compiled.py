@@ -1,4 +1,4 @@
-"""What is compiled is kept on disk, and so may hang on nothing but its own file."""
+"""What is compiled is kept on disk, and so may hang on no file but its own and those whose age is asked for."""
 
 from __future__ import annotations
 
@@ -101,22 +101,47 @@ def test_something_is_compiled() -> None:
 
 
 @pytest.mark.parametrize("file", FILES)
-def test_compiled_functions_use_numpy_and_what_their_own_file_has(file: str) -> None:
+def test_compiled_functions_use_numpy_and_what_files_have_that_they_import_compiled_functions_from(file: str) -> None:
     """Else what is kept would go on with what another file had once: a function of that, or a number."""
     module = importlib.import_module(file.removesuffix(".py").replace("/", "."))
     tree = ast.parse((ROOT / file).read_text(encoding="utf-8"))
-    imported = {
-        name.asname or name.name
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Import | ast.ImportFrom)
-        for name in node.names
-    }
+    imported, watched = set[str](), set[str]()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            names = {name.asname or name.name for name in node.names}
+            imported |= names
+            if any(isinstance(getattr(module, name, None), Compiled) for name in names):
+                watched |= names
     for node in tree.body:
         if isinstance(node, ast.FunctionDef) and "compiled" in map(ast.unparse, node.decorator_list):
             function = getattr(module, node.name)
             plain = getattr(function, "py_func", getattr(function, "_function", function))
-            used = imported.intersection(plain.__code__.co_names)
+            used = (imported - watched).intersection(plain.__code__.co_names)
             assert {name for name in used if not is_library(getattr(module, name))} == set(), node.name
+
+
+@needs_compiling
+def test_it_is_compiled_anew_when_a_file_changes_whose_function_it_calls(tmp_path: Path) -> None:
+    """Also where that is called by one that it calls, from a third file."""
+    (tmp_path / "first.py").write_text(OF_ONE.format("number + 1.0"))
+    for name, other in (("second", "first"), ("third", "second")):
+        calls = f"from {other} import told as other\n" + OF_ONE.format("other(number)")
+        (tmp_path / f"{name}.py").write_text(calls)
+    program = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); import third; print(third.told(1.0), end=' ')"
+    program += "; print(sum(third.told.made.stats.cache_hits.values()))"
+    assert in_a_new_process(program) == "2.0 0"
+    assert in_a_new_process(program) == "2.0 1"
+    (tmp_path / "first.py").write_text(OF_ONE.format("number + 10.0"))
+    assert in_a_new_process(program) == "11.0 0"
+
+
+OF_ONE = """from planner.compiled import compiled
+
+
+@compiled
+def told(number):
+    return {}
+"""
 
 
 def is_library(one: object) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,8 +14,10 @@ from hypothesis import strategies as st
 from looks_worth import worth_of
 
 from coordinator.cut import cutter
-from coordinator.cut.cutter import Cutter, Flown
+from coordinator.cut.cutter import Cutter, Flown, FlownRoutes
 from coordinator.cut.ground import OBJECTIVES, Ground
+from coordinator.cut.laying import Laying
+from coordinator.cut.legs import Flier
 from coordinator.cut.strips import Counted, Cut, CuttingRules
 from coordinator.cut.window import Window
 from planner.types import FloatArray, GridSpec, SweepFrame
@@ -73,7 +76,7 @@ def best_in(time_m: float, *, across: bool = False) -> Flown:
 
 def each(flown: Callable[[Sequence[Counted]], Mapping[int, float]]) -> Flown:
     """What helpers fly of each choice of strips, as of one by itself."""
-    return lambda choices: [flown(cuts) for cuts in choices]
+    return lambda choices: [FlownRoutes(flown(cuts), ()) for cuts in choices]
 
 
 def length_m(one: Counted) -> float:
@@ -301,6 +304,51 @@ class TestHeading:
         for tried in (False, True):
             cuts = cutter.cut(self.ALL_HOT, 2 * STRIP_M, (), opened, best_in(2 * STRIP_M, across=True))
             assert {one.window.across for one in cuts} == {tried}
+
+
+class TestLaying:
+    ALONE = Flier(-50.0, -50.0, 0.0, 0.0, 1000.0, 2.0, 10.0, 20.0)
+
+    @staticmethod
+    def flies(*routes: Sequence[int]) -> Flown:
+        """Helpers with these routes over any choice, as far as it has such strips, all of them flown to the end."""
+
+        def flown(cuts: Sequence[Counted]) -> FlownRoutes:
+            there = [[place for place in route if place < len(cuts)] for route in routes]
+            return FlownRoutes({place: 1.0 for route in there for place in route}, there)
+
+        return lambda choices: [flown(cuts) for cuts in choices]
+
+    @pytest.mark.parametrize(("better", "takes"), [(cutter.LAID_FOR, False), (cutter.LAID_FOR + 1e-4, True)])
+    def test_strips_lie_as_they_are_laid_where_that_is_better_by_enough_and_behind_them_those_to_spare(
+        self, better: float, takes: bool, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        asked = list[tuple[Any, ...]]()
+        aside = Window(0, 60, 12, 22)
+
+        def laid(_: Laying, *given: Any) -> tuple[list[Window], float]:
+            asked.append(given)
+            return [aside.in_blocks(2)], better
+
+        monkeypatch.setattr(Laying, "laid", laid)
+        of_three, told = Cutter(GRID, RULES, LEAST), ground(lanes(0.9, 0.8, 0.7))
+        cuts = of_three.cut(told, math.inf, (), (), self.flies([1]), [self.ALONE])
+        assert windows(cuts) == ([aside, lane(0), lane(2)] if takes else [lane(0), lane(1), lane(2)])
+        (on, routes, others, fliers, seed), *_ = asked
+        assert (routes, fliers) == ([[lane(1).in_blocks(2)]], [self.ALONE])
+        assert {lane(number).in_blocks(2) for number in range(3)} <= set(others)
+        assert on.threshold == pytest.approx(0.9)  # of the worst when its route is flown
+        of_three.cut(told, math.inf, (), (), self.flies([1]), [self.ALONE])
+        assert asked[1][-1] != seed
+
+    def test_nothing_is_laid_without_fliers_or_where_nothing_is_cut(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        def laid(*_: Any) -> None:
+            raise AssertionError("asked for")
+
+        monkeypatch.setattr(Laying, "laid", laid)
+        assert windows(Cutter(GRID, RULES, LEAST).cut(ground(lanes(0.9)), math.inf, (), (), self.flies([0])))
+        flown = self.flies([])
+        assert Cutter(GRID, RULES, LEAST).cut(ground(lanes()), math.inf, (), (), flown, [self.ALONE]) == []
 
 
 class TestClaimed:
