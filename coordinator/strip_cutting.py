@@ -10,7 +10,7 @@ import numpy as np
 
 from comms.said.announcement import RosterVehicle
 from coordinator.allocate.routes import plan_each
-from coordinator.allocate.situation import HORIZON_S, Situation
+from coordinator.allocate.situation import HORIZON_S, Helper, Situation
 from coordinator.briefing import Briefing
 from coordinator.config import CoordinatorConfig
 from coordinator.cut.cutter import Cutter, Flown, FlownRoutes
@@ -99,24 +99,36 @@ class StripCutting:
         return flown
 
     def _fliers(self, situation: Situation) -> list[Flier]:
-        """By whose routes strips are laid before one is offered: none while nobody is to be sent to one, nor where ways
-        are not Dubins's: they are laid by these."""
-        is_plain = all(not one.keep_out and one.sailing.is_in_still_water for one in situation.helpers)
-        if not (self._lays and situation.free and is_plain) or situation.soonest:
+        """By whose routes strips are laid before one is offered: none while nobody is to be sent to one, or nobody can
+        tell when the mission ends, nor where that is not all that routes hang on."""
+        frame, deadline_s = self._grid.frame, situation.deadline_s
+        if not (self._lays and situation.free and math.isfinite(deadline_s)) or situation.soonest:
             return []
-        frame, deadline_s = self._grid.frame, min(situation.deadline_s, situation.now_s + HORIZON_S)
+        if not all(self._is_plain(one, deadline_s) for one in situation.helpers):
+            return []
         return [
             Flier(
                 *frame.to_sweep(one.free_at.x_m, one.free_at.y_m),
                 one.free_at.heading_rad - frame.heading_rad,
                 one.free_s,
-                min(one.lasts_until_s, deadline_s),
+                deadline_s,
                 one.speed_mps,
                 one.turn_radius_m,
                 one.run_in_m,
+                one.lead_m,
             )
             for one in situation.helpers
         ]
+
+    def _is_plain(self, helper: Helper, deadline_s: float) -> bool:
+        """Whether a helper flies Dubins's ways, in still water, with nothing to keep out of and to the middle of
+        strips, and its battery lasts to the mission's end and home from any corner."""
+        rows, columns = self._grid.shape
+        across_m, along_m = columns * self._grid.cell_m, rows * self._grid.cell_m
+        corners = [self._grid.frame.to_mission(x_m, y_m) for x_m in (0.0, across_m) for y_m in (0.0, along_m)]
+        poses = np.array([(x_m, y_m, 0.0) for x_m, y_m in corners])
+        lasts = deadline_s + float(helper.home_s(poses).max()) <= helper.lasts_until_s
+        return lasts and not helper.keep_out and not helper.beside_m and helper.sailing.is_in_still_water
 
     def cut(self, now_ms: int, *, again: bool = False) -> None:
         """Cuts anew, and opens, revises and withdraws strips by that; `again`: also a second one on a place that is

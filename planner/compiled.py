@@ -9,9 +9,10 @@ environment, so that a debugger sees into it.
 from __future__ import annotations
 
 import contextlib
-import os
-from collections.abc import Callable
+import hashlib
+from collections.abc import Callable, Sequence
 from functools import cached_property, update_wrapper
+from pathlib import Path
 from typing import Any, Generic, ParamSpec, TypeVar
 
 P = ParamSpec("P")
@@ -22,8 +23,9 @@ class Compiled(Generic[P, R]):
     """A function that is compiled as it is first called, for the types of what it is given.
 
     What comes of it is kept on disk, beside the source or, where that cannot be written to, in the user's cache, until
-    its file changes, or one from which that imports compiled functions. So of other files it may use nothing: numbers,
-    too, are compiled into it. numba itself is imported with the first call: who never makes one does not wait for it.
+    its file changes, or one from which that imports compiled functions. Of any other file it may use nothing: numbers,
+    too, and the fields of named tuples, are compiled into it. numba itself is imported with the first call: who never
+    makes one does not wait for it.
     """
 
     def __init__(self, function: Callable[P, R]) -> None:
@@ -81,16 +83,17 @@ def _type_of(one: Compiled[..., Any], _: Any) -> Any:
 
 
 def _cache(function: Callable[..., Any]) -> Any:
-    """Keeps what is compiled of a function as numba does, but only while all of `_sources` are as they were. What
-    another version of ours has left there, and cannot be read any more, is forgotten, and on a full disk nothing is
-    kept."""
+    """Keeps what is compiled of a function as numba does, but only while all of `_other_sources` are as they were, too.
+    What another version of ours has left there, and cannot be read any more, is forgotten, and on a full disk nothing
+    is kept."""
     from numba.core.caching import FunctionCache  # noqa: PLC0415, see the class
 
     class Cache(FunctionCache):  # type: ignore[misc]
         def __init__(self, function: Callable[..., Any]) -> None:
             super().__init__(function)
-            stats = map(os.stat, _sources(function))
-            self._cache_file._source_stamp = [(stat.st_mtime, stat.st_size) for stat in stats]
+            others = _other_sources(function)
+            if others:
+                self._cache_file._source_stamp = self._cache_file._source_stamp, _digest(others)
 
         def load_overload(self, *what: Any) -> Any:
             try:
@@ -106,12 +109,23 @@ def _cache(function: Callable[..., Any]) -> Any:
     return Cache(function)
 
 
-def _sources(function: Callable[..., Any]) -> list[str]:
-    """A function's file, those from which it imports compiled functions, those from which these do, and so on."""
+def _other_sources(function: Callable[..., Any]) -> list[str]:
+    """The files from which a function's file imports compiled functions, those from which these do, and so on."""
     found, files = [function], [function.__code__.co_filename]
     for one in found:
         for other in one.__globals__.values():
             if isinstance(other, Compiled) and other._function.__code__.co_filename not in files:
                 found.append(other._function)
                 files.append(other._function.__code__.co_filename)
-    return files
+    return files[1:]
+
+
+def _digest(files: Sequence[str]) -> bytes:
+    """Of what is in these files; raises RuntimeError where one cannot be read."""
+    digest = hashlib.sha256()
+    for file in files:
+        try:
+            digest.update(Path(file).read_bytes())
+        except OSError as error:
+            raise RuntimeError(f"{file} cannot be read") from error
+    return digest.digest()

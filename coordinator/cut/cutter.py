@@ -101,10 +101,10 @@ class Cutter:
         tell.
 
         `claimed`: windows that are with a vehicle. `opened`: those of the open strips, which stay where they are if
-        what is cut anew is hardly better. `fliers`: the helpers by whose routes strips are laid, in the order of these;
-        none where strips stay as they are cut. Where there is time for it places are worth several looks; of strips
-        that lie on one another by three quarters only the first is told, as its place is cut again once that is under
-        way, or all are with `again`.
+        what is cut anew is hardly better. `fliers`: the helpers by whose routes strips are laid, in the order in which
+        `flown` tells these; none where strips stay as they are cut. Where there is time for it places are worth several
+        looks; of strips that lie on one another by three quarters only the first is told, as its place is cut again
+        once that is under way, or all are with `again`.
         """
         in_cells, left = ground.copy(), ground.in_blocks(self._block)
         for window in claimed:
@@ -149,13 +149,13 @@ class Cutter:
         better by enough. `others`: what may be among them."""
         routes = [[best[place] for place in route] for route in flown.routes]
         ground = replace(left, threshold=flown.after.worst_from())
-        found, better = self._laying.laid(ground, routes, others, fliers, self._searches)
-        if better <= LAID_FOR:
+        laid = self._laying.laid(ground, routes, others, fliers, self._searches)
+        if laid.better <= LAID_FOR:
             return best, flown.after
         after = left.copy()
-        after.fly_each(found)
+        after.fly_each(laid.parts)
         spare = [window for place, window in enumerate(best) if place not in flown.shares]
-        return [one.window for one in _counted(left, [*found, *spare], self._kept.least_m2)], after
+        return [one.window for one in _counted(left, [*laid.windows, *spare], self._kept.least_m2)], after
 
     def _anew(self, ground: Ground, windows: Sequence[Window]) -> tuple[Counted, ...]:
         """What windows that are cut anew count, as far as they can be flown."""

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -49,6 +50,15 @@ DRAWS = 8
 """Random numbers of a step."""
 
 
+class Laid(NamedTuple):
+    """`windows`: as strips are laid; `parts`: what of each is flown by the deadline; `better`: by what share more that
+    brings than what was given, infinite if that brought nothing."""
+
+    windows: list[Window]
+    parts: list[Window]
+    better: float
+
+
 class Laying:
     """Lays strips on a grid of blocks. `edge_m`: how far before the frame's origin the grid's first column begins;
     `min_strip_m`, `max_strip_m`: of strips."""
@@ -65,9 +75,8 @@ class Laying:
         others: Sequence[Window],
         fliers: Sequence[Flier],
         seed: int,
-    ) -> tuple[list[Window], float]:
-        """The windows that helpers are to fly, in order, helper by helper, and by what share more these bring than what
-        was given.
+    ) -> Laid:
+        """What helpers are to fly, in order, helper by helper.
 
         Args:
             ground: as it is before.
@@ -76,18 +85,24 @@ class Laying:
             fliers: the helpers, at least one.
             seed: of what is tried.
         """
-        contacts = np.zeros(ground.risk.shape) if ground.contacts is None else ground.contacts.max(axis=0)
-        counts_m2 = counts_of_looks_m2(ground.risk, ground.look, ground.weights, contacts, ground.counts)
+        contacts = np.zeros(ground.risk.shape)
+        if ground.contacts is not None:  # those of either heading: a look does not know from where it is
+            contacts = ground.contacts.min(axis=0)
+        counts_m2 = counts_of_looks_m2(ground.risk, ground.look, ground.weights, contacts, *ground.counts)
         site = Site(counts_m2, self._block_m, self._edge_m, self._shortest, self._longest)
         most = max(map(len, routes)) + len(others)
         legs, count = np.zeros((len(routes), most, LEG), dtype=np.int64), np.array([len(one) for one in routes])
         for helper, route in enumerate(routes):
             legs[helper, : len(route), :UP] = _legs(route)
-        draws = np.random.default_rng(seed).random((STEPS, DRAWS))
-        before_m2, after_m2 = _lay(site, np.array(fliers), legs, count, _legs(others), draws)
-        told = legs[np.arange(most) < count[:, np.newaxis]].tolist()
-        windows = [Window(a, b, c, d, across=bool(across)) for a, b, c, d, across, _ in told]
-        return windows, after_m2 / before_m2 - 1.0 if before_m2 > 0 else 0.0
+        flown, draws = np.zeros((len(routes), most, ACROSS), dtype=np.int64), np.random.default_rng(seed)
+        before_m2, after_m2 = _lay(
+            site, np.array(fliers), legs, count, flown, _legs(others), draws.random((STEPS, DRAWS))
+        )
+        is_there = np.arange(most) < count[:, np.newaxis]
+        windows = [Window(a, b, c, d, across=bool(across)) for a, b, c, d, across, _ in legs[is_there].tolist()]
+        bounds = zip(flown[is_there].tolist(), windows, strict=True)
+        parts = [Window(a, b, c, d, across=window.across) for (a, b, c, d), window in bounds]
+        return Laid(windows, parts, after_m2 / before_m2 - 1.0 if before_m2 > 0 else math.inf)
 
 
 def _legs(windows: Sequence[Window]) -> IntArray:
@@ -97,10 +112,16 @@ def _legs(windows: Sequence[Window]) -> IntArray:
 
 @compiled
 def _lay(
-    site: Site, fliers: FloatArray, legs: IntArray, count: IntArray, others: IntArray, draws: FloatArray
+    site: Site,
+    fliers: FloatArray,
+    legs: IntArray,
+    count: IntArray,
+    flown: IntArray,
+    others: IntArray,
+    draws: FloatArray,
 ) -> tuple[float, float]:
-    """Lays legs anew, in place; returns what they brought, and what they bring now. `draws`: of each step random
-    numbers in [0, 1)."""
+    """Lays legs anew, in place, and tells what of them is `flown` in time; returns what they brought, and what they
+    bring now. `draws`: of each step random numbers in [0, 1)."""
     helpers, most = legs.shape[:2]
     now = Routes(
         legs.copy(),
@@ -117,8 +138,7 @@ def _lay(
         now.number[one] = 0
         now_m2 += exchange(site, fliers, now, trial, one)
         take(trial, now, one)
-    legs[:] = now.legs
-    count[:] = now.number
+    legs[:], count[:], flown[:] = now.legs, now.number, now.flown
     before_m2 = best_m2 = now_m2
     for step in range(len(draws)):
         one, other = _change(site, now, trial, others, draws[step])
@@ -132,8 +152,7 @@ def _lay(
             take(trial, now, other)
             if now_m2 > best_m2:
                 best_m2 = now_m2
-                legs[:] = now.legs
-                count[:] = now.number
+                legs[:], count[:], flown[:] = now.legs, now.number, now.flown
         else:
             look_at_what_differs(site, trial, now, one)
             if other != one:
@@ -244,10 +263,11 @@ def _make_longer(site: Site, leg: IntArray, begin: int, end: int) -> None:
         leg[first], leg[first + 1] = begin, end
 
 
-def _sample() -> tuple[Site, FloatArray, IntArray, IntArray, IntArray, FloatArray]:
+def _sample() -> tuple[Site, FloatArray, IntArray, IntArray, IntArray, IntArray, FloatArray]:
     site = Site(np.ones((MOST_LOOKS, 2, 2)), 1.0, 0.5, 1, 2)
     legs, count = np.array([[[0, 2, 0, 1, 0, 1]]]), np.ones(1, dtype=np.int64)
-    return site, np.ones((1, len(Flier._fields))), legs, count, legs[0, :, :UP].copy(), np.full((1, DRAWS), 0.5)
+    fliers, flown = np.ones((1, len(Flier._fields))), np.zeros((1, 1, ACROSS), dtype=np.int64)
+    return site, fliers, legs, count, flown, legs[0, :, :UP].copy(), np.full((1, DRAWS), 0.5)
 
 
 _lay.called_with(_sample)

@@ -1,8 +1,8 @@
 """What helpers fly of routes over windows in time, and what looks from there count.
 
-A leg is a strip's window of blocks and in which direction it is flown. Looks count as they do in `Ground`; ways are
-Dubins's shortest, as they are in still water where nothing is to keep out of; of a leg only what is flown by the
-deadline counts. All of it is compiled.
+A leg is a strip's window of blocks and in which direction it is flown. Looks count as they do in `Ground`, by its
+threshold; ways are Dubins's shortest, as they are in still water where nothing is to keep out of; of a leg only what is
+flown by the deadline counts. All of it is compiled.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coordinator.cut.search import Counts
 from planner.compiled import compiled
 from planner.dubins import TIE_M, in_radii, path_length_m
 from planner.types import FloatArray, IntArray
@@ -21,6 +20,8 @@ from planner.types import FloatArray, IntArray
 ACROSS, UP, LEG = 4, 5, 6
 """Where in a leg it is told whether its strip runs across the tracks, and whether it is flown as that runs, and how
 many numbers it has; before these are its window's bounds, in blocks."""
+ROUNDED_M = 1e-6
+"""To which ways are rounded."""
 MOST_LOOKS = 4
 """Of more looks at a block those behind these count for nothing."""
 
@@ -31,21 +32,23 @@ Looks = NDArray[np.uint8]
 
 class Flier(NamedTuple):
     """A helper as it flies: where and when it is free, in the grid's own frame, metres across and along it and radians
-    clockwise from along it; until when it is of use; its speed, turn radius and run-in."""
+    clockwise from along it; when the mission ends; its speed, turn radius and run-in; how much earlier it flies a leg
+    than over the ground that it sees."""
 
     across_m: float
     along_m: float
     heading_rad: float
     free_s: float
-    until_s: float
+    ends_s: float
     speed_mps: float
     turn_radius_m: float
     run_in_m: float
+    lead_m: float
 
 
 class Site(NamedTuple):
     """Ground as it is looked at. `counts_m2`, shape (looks, rows, columns): how much less is left with each look at a
-    block than with those before it, see `Ground.left_m2`. `block_m`: a block's side; `edge_m`: how far before the
+    block than with those before it. `block_m`: a block's side; `edge_m`: how far before the
     frame's origin the first column begins; `shortest`, `longest`: of strips, in blocks."""
 
     counts_m2: FloatArray
@@ -69,17 +72,24 @@ class Routes(NamedTuple):
 
 @compiled
 def counts_of_looks_m2(
-    risk: FloatArray, look: FloatArray, weights: FloatArray, contacts: FloatArray, counts: Counts
+    risk: FloatArray,
+    look: FloatArray,
+    weights: FloatArray,
+    contacts: FloatArray,
+    mean: float,
+    worst: float,
+    threshold: float,
 ) -> FloatArray:
-    """See `Site`; `contacts`: what the first look at the objects in a block counts."""
+    """See `Site`; `contacts`: what the first look at the objects in a block counts; the others: see `Ground` and
+    `coordinator.cut.search.Counts`."""
     counts_m2 = np.empty((MOST_LOOKS, *risk.shape))
     for row in range(risk.shape[0]):
         for column in range(risk.shape[1]):
             left = risk[row, column]
             for which in range(MOST_LOOKS):
                 less = left * look[row, column]
-                above = min(less, max(left - counts.threshold, 0.0))
-                counts_m2[which, row, column] = weights[row, column] * (counts.mean * less + counts.worst * above)
+                above = min(less, max(left - threshold, 0.0))
+                counts_m2[which, row, column] = weights[row, column] * (mean * less + worst * above)
                 left -= less
             counts_m2[0, row, column] += contacts[row, column]
     return counts_m2
@@ -99,8 +109,8 @@ def take(routes: Routes, to: Routes, one: int) -> None:
 
 @compiled
 def exchange(site: Site, fliers: FloatArray, now: Routes, trial: Routes, one: int) -> float:
-    """What is gained if a helper flies its route of a trial; of that the legs are left out that it would only begin
-    when it is of use no more."""
+    """Has a helper fly its route of a trial, and returns what that gains. Its last legs are taken out of that route if
+    nothing of them is flown in time."""
     _fly(site, fliers[one], now, trial, one)
     last = trial.number[one] - 1
     while last >= 0 and _is_empty(trial.flown[one, last]):
@@ -115,9 +125,9 @@ def _is_empty(part: IntArray) -> bool:
 
 
 @compiled
-def look_at_what_differs(site: Site, routes: Routes, others: Routes, one: int) -> float:
-    """Flies a helper's route of the others instead of the one it has; returns what that gains."""
-    parts, its_parts, count, its_count = routes.flown[one], others.flown[one], routes.number[one], others.number[one]
+def look_at_what_differs(site: Site, routes: Routes, instead: Routes, one: int) -> float:
+    """Has a helper fly its route of those instead of the one it has; returns what that gains."""
+    parts, its_parts, count, its_count = routes.flown[one], instead.flown[one], routes.number[one], instead.number[one]
     is_in_both, new, news = np.zeros(count, np.bool_), np.empty(its_count, np.int64), 0
     for its in range(its_count):
         place = 0
@@ -179,7 +189,7 @@ def _look(site: Site, looks: Looks, part: IntArray, by: int) -> float:
     counts_m2 = 0.0
     for row in range(part[0], part[1]):
         for column in range(part[2], part[3]):
-            before = looks[row, column]
+            before = np.int64(looks[row, column])
             looks[row, column] = before + by
             which = min(before, before + by)
             if which < MOST_LOOKS:
@@ -191,7 +201,7 @@ def _look(site: Site, looks: Looks, part: IntArray, by: int) -> float:
 def _fly(site: Site, flier: FloatArray, now: Routes, trial: Routes, one: int) -> None:
     """Finds what a helper flies in time of each leg of its route of a trial. Ways are worked out where the legs before
     and behind them are not those of the route that it has now."""
-    free_s, until_s, speed_mps, run_in_m = flier[3], flier[4], flier[5], flier[7]
+    free_s, ends_s, speed_mps, run_in_m = flier[3], flier[4], flier[5], flier[7]
     legs, now_s, was_same = trial.legs[one], free_s, True
     for place in range(trial.number[one]):
         leg = legs[place]
@@ -202,7 +212,7 @@ def _fly(site: Site, flier: FloatArray, now: Routes, trial: Routes, one: int) ->
         first = 2 if leg[ACROSS] == 1 else 0
         begin, end = leg[first], leg[first + 1]
         now_s += trial.way_m[one, place] / speed_mps
-        in_time = int((until_s - now_s) * speed_mps / site.block_m + 0.5) if now_s < until_s else 0
+        in_time = int((ends_s - now_s) * speed_mps / site.block_m + 0.5) if now_s < ends_s else 0
         if in_time < end - begin:
             begin, end = (begin, begin + in_time) if leg[UP] == 1 else (end - in_time, end)
         for its in range(ACROSS):
@@ -226,29 +236,29 @@ def turn_for_shortest(site: Site, flier: FloatArray, legs: IntArray, count: int)
 @compiled
 def _way_m(site: Site, flier: FloatArray, legs: IntArray, place: int) -> float:
     """How long the way to a leg is, from that before it or from where the helper is free, with its run-in."""
-    poses, turn_radius_m, run_in_m = np.empty((2, 3)), flier[6], flier[7]
+    poses, turn_radius_m, run_in_m, lead_m = np.empty((2, 3)), flier[6], flier[7], flier[8]
     if place == 0:
         poses[0] = flier[:3]
     else:
-        _end_of(site, legs[place - 1], run_in_m, poses[0], 1)
-    _end_of(site, legs[place], run_in_m, poses[1], -1)
+        _end_of(site, legs[place - 1], run_in_m - lead_m, poses[0], 1)
+    _end_of(site, legs[place], run_in_m + lead_m, poses[1], -1)
     in_turn_radii = in_radii(poses, turn_radius_m)
     way_m: float = path_length_m(in_turn_radii[0], in_turn_radii[1], turn_radius_m) + run_in_m
-    return way_m
+    return math.floor(way_m / ROUNDED_M + 0.5) * ROUNDED_M  # the same on every processor
 
 
 @compiled
-def _end_of(site: Site, leg: IntArray, run_in_m: float, pose: FloatArray, side: int) -> None:
-    """Where a leg is left, behind its run-out, `side` 1, or where its run-in begins, -1."""
+def _end_of(site: Site, leg: IntArray, beyond_m: float, pose: FloatArray, side: int) -> None:
+    """Where a leg is left, so far behind its end, `side` 1, or where its run-in begins, so far before it, -1."""
     rows, columns, block_m = leg[0] + leg[1], leg[2] + leg[3], site.block_m
     ahead = side if leg[UP] == 1 else -side
     pose[0], pose[1], pose[2] = columns * block_m / 2 - site.edge_m, rows * block_m / 2, 0.0
     if leg[ACROSS] == 1:
-        pose[0] += ahead * ((leg[3] - leg[2]) * block_m / 2 + run_in_m)
+        pose[0] += ahead * ((leg[3] - leg[2]) * block_m / 2 + beyond_m)
         pose[2] = math.pi / 2 if leg[UP] == 1 else -math.pi / 2
     else:
-        pose[1] += ahead * ((leg[1] - leg[0]) * block_m / 2 + run_in_m)
+        pose[1] += ahead * ((leg[1] - leg[0]) * block_m / 2 + beyond_m)
         pose[2] = 0.0 if leg[UP] == 1 else math.pi
 
 
-counts_of_looks_m2.called_with(lambda: (*np.ones((4, 2, 2)), Counts(1.0, 1.0, 0.0)))
+counts_of_looks_m2.called_with(lambda: (*np.ones((4, 2, 2)), 1.0, 1.0, 0.0))

@@ -73,12 +73,13 @@ def test_where_there_is_ground_to_keep_out_of_strips_are_cut_so_that_the_helper_
 
 class TestByWhoseRoutesStripsAreLaid:
     @staticmethod
-    def fliers(node: Coordinator, mode: Mode = Mode.IDLE, *, soonest: bool = False) -> list[Flier]:
+    def fliers(node: Coordinator, mode: Mode = Mode.IDLE, of_helper: Any = (), **of_situation: Any) -> list[Flier]:
+        """With the helper, and the situation, changed."""
         told = Told(OneNode(node, Role.COORDINATOR))
         told.state(HELPER, mode)
-        sector = node._sectors.all[0]
-        situation = node._briefing.situation(5_000, sector)
-        return node._cutting[0]._fliers(replace(situation, soonest=soonest, deadline_s=900.0))
+        situation = node._briefing.situation(5_000, node._sectors.all[0])
+        helpers = tuple(replace(one, **dict(of_helper)) for one in situation.helpers)
+        return node._cutting[0]._fliers(replace(situation, **{"helpers": helpers, "deadline_s": 900.0, **of_situation}))
 
     def test_those_of_the_helpers_in_the_grids_own_frame_until_the_deadline(self) -> None:
         node = told_of_run(allocator=LaidRoutesAllocator())
@@ -89,13 +90,31 @@ class TestByWhoseRoutesStripsAreLaid:
         assert flier[:3] == pytest.approx((across_m, along_m, state.heading_rad - GRID.frame.heading_rad))
         assert flier[3:5] == (5.0, 900.0)
         entry = FLEET[1]
-        assert flier[5:] == (entry.speed_mps, entry.turn_radius_m, entry.run_in_m)
+        assert flier[5:] == (entry.speed_mps, entry.turn_radius_m, entry.run_in_m, 0.0)
 
     def test_nobodys_while_nobody_is_to_be_sent_to_a_strip_or_where_what_is_worth_most_is_to_be_removed_first(
         self,
     ) -> None:
         assert self.fliers(told_of_run(allocator=LaidRoutesAllocator()), Mode.SURVEY) == []
         assert self.fliers(told_of_run(allocator=LaidRoutesAllocator()), soonest=True) == []
+
+    def test_nobodys_while_nobody_can_tell_when_the_mission_ends(self) -> None:
+        assert self.fliers(told_of_run(allocator=LaidRoutesAllocator()), deadline_s=math.inf) == []
+
+    @pytest.mark.parametrize(
+        ("of_helper", "helpers"),
+        [
+            ({"lasts_until_s": 900.0, "way_home": None}, 1),
+            ({"lasts_until_s": 899.0, "way_home": None}, 0),
+            ({"lasts_until_s": 900.0}, 0),  # it must be home by then
+            ({"beside_m": 5.0}, 0),
+            ({"lead_m": 5.0}, 1),
+        ],
+    )
+    def test_nobodys_where_a_battery_may_end_before_the_mission_or_a_leg_lies_beside_its_strip(
+        self, of_helper: dict[str, Any], helpers: int
+    ) -> None:
+        assert len(self.fliers(told_of_run(allocator=LaidRoutesAllocator()), of_helper=of_helper)) == helpers
 
     def test_nobodys_where_the_allocator_does_not_say_so(self) -> None:
         assert self.fliers(told_of_run(allocator=GreedyAllocator())) == []

@@ -16,7 +16,7 @@ from looks_worth import worth_of
 from coordinator.cut import cutter
 from coordinator.cut.cutter import Cutter, Flown, FlownRoutes
 from coordinator.cut.ground import OBJECTIVES, Ground
-from coordinator.cut.laying import Laying
+from coordinator.cut.laying import Laid, Laying
 from coordinator.cut.legs import Flier
 from coordinator.cut.strips import Counted, Cut, CuttingRules
 from coordinator.cut.window import Window
@@ -307,7 +307,7 @@ class TestHeading:
 
 
 class TestLaying:
-    ALONE = Flier(-50.0, -50.0, 0.0, 0.0, 1000.0, 2.0, 10.0, 20.0)
+    ALONE = Flier(-50.0, -50.0, 0.0, 0.0, 1000.0, 2.0, 10.0, 20.0, 0.0)
 
     @staticmethod
     def flies(*routes: Sequence[int]) -> Flown:
@@ -326,9 +326,11 @@ class TestLaying:
         asked = list[tuple[Any, ...]]()
         aside = Window(0, 60, 12, 22)
 
-        def laid(_: Laying, *given: Any) -> tuple[list[Window], float]:
+        half = Window(0, 30, 12, 22)
+
+        def laid(_: Laying, *given: Any) -> Laid:
             asked.append(given)
-            return [aside.in_blocks(2)], better
+            return Laid([aside.in_blocks(2)], [half.in_blocks(2)], better)
 
         monkeypatch.setattr(Laying, "laid", laid)
         of_three, told = Cutter(GRID, RULES, LEAST), ground(lanes(0.9, 0.8, 0.7))
