@@ -2,8 +2,8 @@
 they work on.
 
 A compiled function is written in the part of Python that numba knows: numbers, arrays, tuples of them, and compiled
-functions. Not compiled it does the same, a hundred times slower: with NUMBA_DISABLE_JIT=1 in the
-environment, so that a debugger sees into it.
+functions. Not compiled it does the same, a hundred times slower: with NUMBA_DISABLE_JIT=1 in the environment, so that a
+debugger sees into it.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ _called: list[tuple[Compiled[..., Any], Callable[[], tuple[Any, ...]]]] = []
 
 def compile_all() -> None:
     """Compiles what is called from without of all modules that are loaded, or reads it from disk: so that nobody waits
-    for that once time matters. The first time on a machine it takes some fifteen seconds."""
+    for that once time matters. The first time on a machine it takes half a minute."""
     while _called:
         one, sample = _called.pop()
         one(*sample())

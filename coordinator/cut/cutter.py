@@ -39,13 +39,12 @@ Flown = Callable[[Sequence[Sequence[Counted]]], Sequence[FlownRoutes]]
 
 
 class _Outcome(NamedTuple):
-    """`after`: the ground as helpers leave it; `left_m2`: what is left of the objective, with what the metres flown
-    cost at least; the others: see `FlownRoutes`."""
+    """What comes of what is `flown`. `after`: the ground as helpers leave it; `left_m2`: what is left of the objective,
+    with what the metres flown cost at least."""
 
+    flown: FlownRoutes
     after: Ground
     left_m2: float
-    shares: Mapping[int, float]
-    routes: Sequence[Sequence[int]]
 
 
 class Cutter:
@@ -70,7 +69,7 @@ class Cutter:
         self._block = _block(cells_wide(grid, rules.swath_m))
         least_price = least_worth * rules.swath_m / grid.cell_area_m2
         blocks = replace(grid, cell_m=grid.cell_m * self._block)
-        self._laying = Laying(blocks, grid.cell_m / 2, rules.min_strip_m, rules.max_strip_m)
+        self._laying = Laying(blocks, grid.cell_m / 2, rules)
         headings = (False, True) if across else (False,)
         self._ways = [OneHeading(blocks, rules, least_price, across=way) for way in headings]
         self._kept = self._ways[0]
@@ -143,18 +142,18 @@ class Cutter:
         return windows, after
 
     def _laid(
-        self, left: Ground, best: list[Window], flown: _Outcome, others: Sequence[Window], fliers: Sequence[Flier]
+        self, left: Ground, best: list[Window], outcome: _Outcome, others: Sequence[Window], fliers: Sequence[Flier]
     ) -> tuple[list[Window], Ground]:
         """The same as they are laid for the routes over them, and behind them those over which none goes, if that is
         better by enough. `others`: what may be among them."""
-        routes = [[best[place] for place in route] for route in flown.routes]
-        ground = replace(left, threshold=flown.after.worst_from())
+        routes = [[best[place] for place in route] for route in outcome.flown.routes]
+        ground = replace(left, threshold=outcome.after.worst_from())
         laid = self._laying.laid(ground, routes, others, fliers, self._searches)
         if laid.better <= LAID_FOR:
-            return best, flown.after
+            return best, outcome.after
         after = left.copy()
         after.fly_each(laid.parts)
-        spare = [window for place, window in enumerate(best) if place not in flown.shares]
+        spare = [window for place, window in enumerate(best) if place not in outcome.flown.shares]
         return [one.window for one in _counted(left, [*laid.windows, *spare], self._kept.least_m2)], after
 
     def _anew(self, ground: Ground, windows: Sequence[Window]) -> tuple[Counted, ...]:
@@ -171,12 +170,12 @@ class Cutter:
             [Counted(one.window.in_cells(self._block, self._shape), one.counts_m2) for one in choice]
             for choice in differ
         ]
-        for choice, (shares, routes) in zip(differ, flown(in_cells), strict=True):
-            after, windows, least_m2 = ground.copy(), [choice[place].window for place in shares], 0.0
-            after.fly_each(windows, list(shares.values()))
-            for window, share in zip(windows, shares.values(), strict=True):
+        for choice, its in zip(differ, flown(in_cells), strict=True):
+            after, windows, least_m2 = ground.copy(), [choice[place].window for place in its.shares], 0.0
+            after.fly_each(windows, list(its.shares.values()))
+            for window, share in zip(windows, its.shares.values(), strict=True):
                 least_m2 += share * self._kept.least_m2(window)
-            outcomes[choice] = _Outcome(after, after.left_m2() + least_m2, shares, routes)
+            outcomes[choice] = _Outcome(its, after, after.left_m2() + least_m2)
         return outcomes
 
     def _cuts(self, ground: Ground, windows: Sequence[Window]) -> list[Cut]:

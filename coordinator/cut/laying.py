@@ -33,6 +33,7 @@ from coordinator.cut.legs import (
     take,
     turn_for_shortest,
 )
+from coordinator.cut.strips import CuttingRules
 from coordinator.cut.window import Window
 from planner.compiled import compiled
 from planner.types import FloatArray, GridSpec, IntArray
@@ -60,13 +61,11 @@ class Laid(NamedTuple):
 
 
 class Laying:
-    """Lays strips on a grid of blocks. `edge_m`: how far before the frame's origin the grid's first column begins;
-    `min_strip_m`, `max_strip_m`: of strips."""
+    """Lays strips on a grid of blocks. `edge_m`: how far before the frame's origin the grid's first column begins."""
 
-    def __init__(self, blocks: GridSpec, edge_m: float, min_strip_m: float, max_strip_m: float) -> None:
+    def __init__(self, blocks: GridSpec, edge_m: float, rules: CuttingRules) -> None:
         self._block_m, self._edge_m = float(blocks.cell_m), float(edge_m)
-        self._shortest = max(1, round(min_strip_m / blocks.cell_m))
-        self._longest = max(self._shortest, round(max_strip_m / blocks.cell_m))
+        self._shortest, self._longest = rules.cells_long(blocks)
 
     def laid(
         self,
@@ -88,7 +87,7 @@ class Laying:
         contacts = np.zeros(ground.risk.shape)
         if ground.contacts is not None:  # those of either heading: a look does not know from where it is
             contacts = ground.contacts.min(axis=0)
-        counts_m2 = counts_of_looks_m2(ground.risk, ground.look, ground.weights, contacts, *ground.counts)
+        counts_m2 = counts_of_looks_m2(ground.risk, ground.look, ground.weights, contacts, ground.counts)
         site = Site(counts_m2, self._block_m, self._edge_m, self._shortest, self._longest)
         most = max(map(len, routes)) + len(others)
         legs, count = np.zeros((len(routes), most, LEG), dtype=np.int64), np.array([len(one) for one in routes])
@@ -201,22 +200,18 @@ def _change(site: Site, now: Routes, trial: Routes, others: IntArray, draw: Floa
     elif which < TURN:
         turned_from = place
     else:
-        given = legs[place].copy()
         other = int(draw[3] * now.number.size)
         its_count = now.number[other] if other != one else count - 1
         if its_count < most:
-            _take_out(legs, count, place)
-            count -= 1
+            given = legs[place].copy()
             if other != one:
                 take(now, trial, other)
+            _take_out(legs, count, place)
             its_place = int(draw[4] * (its_count + 1))
             _put_in(trial.legs[other], its_count, its_place)
             trial.legs[other, its_place] = given
+            trial.number[one] = count - 1
             trial.number[other] = its_count + 1
-            if other != one:
-                trial.number[one] = count
-            else:
-                count += 1
             return one, other
     for its in range(turned_from, count):
         legs[its, UP] = 1 - legs[its, UP]

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from coordinator.cut.search import Counts, worth_of
 from planner.compiled import compiled
 from planner.dubins import TIE_M, in_radii, path_length_m
 from planner.types import FloatArray, IntArray
@@ -24,7 +25,6 @@ ROUNDED_M = 1e-6
 """To which ways are rounded."""
 MOST_LOOKS = 4
 """Of more looks at a block those behind these count for nothing."""
-
 
 Looks = NDArray[np.uint8]
 """How many looks each block has, shape of the ground."""
@@ -48,8 +48,8 @@ class Flier(NamedTuple):
 
 class Site(NamedTuple):
     """Ground as it is looked at. `counts_m2`, shape (looks, rows, columns): how much less is left with each look at a
-    block than with those before it. `block_m`: a block's side; `edge_m`: how far before the
-    frame's origin the first column begins; `shortest`, `longest`: of strips, in blocks."""
+    block than with those before it. `block_m`: a block's side; `edge_m`: how far before the frame's origin the first
+    column begins; `shortest`, `longest`: of strips, in blocks."""
 
     counts_m2: FloatArray
     block_m: float
@@ -72,26 +72,17 @@ class Routes(NamedTuple):
 
 @compiled
 def counts_of_looks_m2(
-    risk: FloatArray,
-    look: FloatArray,
-    weights: FloatArray,
-    contacts: FloatArray,
-    mean: float,
-    worst: float,
-    threshold: float,
+    risk: FloatArray, look: FloatArray, weights: FloatArray, contacts: FloatArray, counts: Counts
 ) -> FloatArray:
-    """See `Site`; `contacts`: what the first look at the objects in a block counts; the others: see `Ground` and
-    `coordinator.cut.search.Counts`."""
+    """See `Site`; `contacts`: what the first look at the objects in a block counts."""
     counts_m2 = np.empty((MOST_LOOKS, *risk.shape))
     for row in range(risk.shape[0]):
         for column in range(risk.shape[1]):
-            left = risk[row, column]
+            at = row, column
+            left, contact = risk[at], contacts[at]
             for which in range(MOST_LOOKS):
-                less = left * look[row, column]
-                above = min(less, max(left - threshold, 0.0))
-                counts_m2[which, row, column] = weights[row, column] * (mean * less + worst * above)
-                left -= less
-            counts_m2[0, row, column] += contacts[row, column]
+                counts_m2[which, row, column] = worth_of(left, look[at], weights[at], contact, counts)
+                left, contact = left * (1.0 - look[at]), 0.0
     return counts_m2
 
 
@@ -261,4 +252,4 @@ def _end_of(site: Site, leg: IntArray, beyond_m: float, pose: FloatArray, side: 
         pose[2] = 0.0 if leg[UP] == 1 else math.pi
 
 
-counts_of_looks_m2.called_with(lambda: (*np.ones((4, 2, 2)), 1.0, 1.0, 0.0))
+counts_of_looks_m2.called_with(lambda: (*np.ones((4, 2, 2)), Counts(1.0, 1.0, 0.0)))

@@ -153,7 +153,7 @@ def fly_each(
             for column in range(first_column, end_column):
                 at = row, column
                 contact = contacts[0, row, column] if len(contacts) else 0.0
-                worth[cells] = _worth(risk[at], look[at], weights[at], contact, counts)
+                worth[cells] = worth_of(risk[at], look[at], weights[at], contact, counts)
                 removed[cells] = risk[at] * look[at]
                 if is_seen[at]:
                     seen[cells_seen] = worth[cells]
@@ -204,7 +204,8 @@ def _sum_of_few(values: FloatArray, first: int, end: int) -> float:
 
 
 @compiled
-def _worth(risk: float, look: float, weight: float, contact: float, counts: Counts) -> float:
+def worth_of(risk: float, look: float, weight: float, contact: float, counts: Counts) -> float:
+    """What a look at a cell counts."""
     above = max(risk - counts.threshold, 0.0) - max(risk * (1.0 - look) - counts.threshold, 0.0)
     return (counts.mean * risk * look + above * counts.worst) * weight + contact
 
@@ -235,7 +236,7 @@ def look_anew(left: Left, counts: Counts, first_row: int, end_row: int, first_co
     for row in range(first_row, end_row):
         for column in range(first_column, end_column):
             at = row, column
-            left.worth[at] = _worth(left.risk[at], left.look[at], left.weights[at], left.contacts[at], counts)
+            left.worth[at] = worth_of(left.risk[at], left.look[at], left.weights[at], left.contacts[at], counts)
         for window in range(max(first_column - width + 1, 0), min(end_column, windows)):
             total = left.worth[row, window]
             for column in range(window + 1, window + width):

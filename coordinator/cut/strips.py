@@ -28,6 +28,11 @@ class CuttingRules:
         """For a strip of some length, the way there included."""
         return length_m + self.overhead_m
 
+    def cells_long(self, grid: GridSpec) -> tuple[int, int]:
+        """The shortest strip, and the longest, in cells of a grid."""
+        shortest = max(1, round(self.min_strip_m / grid.cell_m))
+        return shortest, max(shortest, round(self.max_strip_m / grid.cell_m))
+
 
 @dataclass(frozen=True)
 class Counted:
@@ -73,9 +78,7 @@ class Cutting:
             is_known=np.zeros(windows, dtype=np.bool_),
         )
         look_anew(self._left, self._counts, 0, rows, 0, columns)
-        shortest = max(1, round(rules.min_strip_m / grid.cell_m))
-        longest = max(shortest, round(rules.max_strip_m / grid.cell_m))
-        self._metres = Costs(float(grid.cell_m), float(rules.overhead_m), shortest, longest)
+        self._metres = Costs(float(grid.cell_m), float(rules.overhead_m), *rules.cells_long(grid))
 
     def cut(self, price: float, least_price: float, time_m: float) -> tuple[list[Window], float]:
         """As many windows as there is time for and some to spare, those first that lie side by side; one that lies on

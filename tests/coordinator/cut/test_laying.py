@@ -14,11 +14,12 @@ from coordinator.cut import laying
 from coordinator.cut.ground import OBJECTIVES, Ground
 from coordinator.cut.laying import Laying
 from coordinator.cut.legs import Flier
+from coordinator.cut.strips import CuttingRules
 from coordinator.cut.window import Window
 from planner.types import FloatArray, GridSpec, SweepFrame
 
 BLOCKS = GridSpec(SweepFrame(0.0, 0.0, 0.0), 10.0, 30, 40)
-LAYING = Laying(BLOCKS, edge_m=2.5, min_strip_m=50.0, max_strip_m=400.0)
+LAYING = Laying(BLOCKS, 2.5, CuttingRules(swath_m=50.0, overhead_m=90.0, min_strip_m=50.0, max_strip_m=400.0))
 BELOW = Flier(72.5, -40.0, 0.0, 0.0, 300.0, 2.0, 15.0, 20.0, 0.0)
 
 

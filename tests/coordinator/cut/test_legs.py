@@ -23,6 +23,7 @@ from coordinator.cut.legs import (
     take,
     turn_for_shortest,
 )
+from coordinator.cut.search import Counts
 from coordinator.cut.strips import strip_of
 from coordinator.cut.window import Window
 from planner.dubins import Pose, shortest_path
@@ -42,7 +43,7 @@ FROM_BELOW = Flier(22.5, -40.0, 0.0, 100.0, 10_000.0, 2.0, 15.0, 20.0, 0.0)  # b
 def site_of(risk: FloatArray, look: float = 0.5, threshold: float = 1.0) -> Site:
     """Where a look counts its residual risk times m2, and above the threshold twice of what is above it."""
     size = np.ones(SHAPE)
-    counts_m2 = counts_of_looks_m2(risk, look * size, 100.0 * size, 0.0 * size, 1.0, 2.0, threshold)
+    counts_m2 = counts_of_looks_m2(risk, look * size, 100.0 * size, 0.0 * size, Counts(1.0, 2.0, threshold))
     return Site(counts_m2, BLOCK_M, EDGE_M, 2, 30)
 
 
@@ -74,7 +75,7 @@ def flown_at_first(site: Site, routes: Routes, *fliers: Flier) -> float:
 class TestWhatLooksCount:
     def test_each_look_counts_what_those_before_it_have_left(self) -> None:
         one = np.ones((1, 1))
-        told = counts_of_looks_m2(0.8 * one, 0.5 * one, 10.0 * one, 3.0 * one, 0.7, 1.0, 0.3)
+        told = counts_of_looks_m2(0.8 * one, 0.5 * one, 10.0 * one, 3.0 * one, Counts(0.7, 1.0, 0.3))
         # 0.8, 0.4, 0.2, 0.1: what is above 0.3 is 0.5, 0.1 and nothing; the objects count once.
         assert told[:, 0, 0].tolist() == pytest.approx(
             [10 * (0.7 * 0.4 + 0.4) + 3, 10 * (0.7 * 0.2 + 0.1), 10 * 0.7 * 0.1, 10 * 0.7 * 0.05]
@@ -91,7 +92,7 @@ class TestWhatLooksCount:
             worst_m2 = np.maximum(risk - threshold, 0.0).sum() / WORST
             return float(25.0 * (ground.objective.mean * risk.sum() + ground.objective.worst * worst_m2))
 
-        told = counts_of_looks_m2(ground.risk, ground.look, ground.weights, 0.0 * size, *ground.counts)
+        told = counts_of_looks_m2(ground.risk, ground.look, ground.weights, 0.0 * size, ground.counts)
         after = risk * (1.0 - look) ** MOST_LOOKS
         assert told.sum() == pytest.approx(left_m2(risk) - left_m2(after), abs=1e-6)
 
