@@ -123,12 +123,13 @@ class StripCutting:
     def _is_plain(self, helper: Helper, deadline_s: float) -> bool:
         """Whether a helper flies Dubins's ways, in still water, with nothing to keep out of and to the middle of
         strips, and its battery lasts to the mission's end and home from any corner."""
+        if helper.keep_out or helper.beside_m or not helper.sailing.is_in_still_water:
+            return False
         rows, columns = self._grid.shape
         across_m, along_m = columns * self._grid.cell_m, rows * self._grid.cell_m
         corners = [self._grid.frame.to_mission(x_m, y_m) for x_m in (0.0, across_m) for y_m in (0.0, along_m)]
         poses = np.array([(x_m, y_m, 0.0) for x_m, y_m in corners])
-        lasts = deadline_s + float(helper.home_s(poses).max()) <= helper.lasts_until_s
-        return lasts and not helper.keep_out and not helper.beside_m and helper.sailing.is_in_still_water
+        return deadline_s + float(helper.home_s(poses).max()) <= helper.lasts_until_s
 
     def cut(self, now_ms: int, *, again: bool = False) -> None:
         """Cuts anew, and opens, revises and withdraws strips by that; `again`: also a second one on a place that is
