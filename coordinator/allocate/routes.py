@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -48,10 +49,11 @@ class RoutesAllocator:
     """The default allocator: see the module. Each free helper is offered the first strip of its route.
 
     A helper on its way to a strip is turned round where the routes are then better by `switch_margin` of what its task
-    is worth.
+    is worth. `lays_strips`: strips are laid for the routes over them, see `coordinator.cut.laying`.
     """
 
     beam: int = BEAM
+    lays_strips: ClassVar[bool] = True
 
     def assign(self, situation: Situation) -> Mapping[str, int]:
         """See `Allocator`."""
@@ -82,14 +84,6 @@ class RoutesAllocator:
             if is_better and route[0] != task.strip.number and route[0] not in offers.values():
                 offers[free.vehicle] = route[0]
         return offers
-
-
-@dataclass(frozen=True)
-class LaidRoutesAllocator(RoutesAllocator):
-    """The same, and strips are laid for its routes before one is offered, see `coordinator.cut.laying`, so that less is
-    left. In a scenario it is `coordinator.allocate.routes:LaidRoutesAllocator`."""
-
-    lays_strips: bool = True
 
 
 def _to_idle(situation: Situation, offers: Mapping[str, int]) -> Mapping[str, int]:

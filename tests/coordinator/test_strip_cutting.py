@@ -25,7 +25,7 @@ from one_node import OneNode
 
 from comms.said.announcement import Role, RunInfo, Vertex, Zone
 from comms.said.messages import Contact, Mode, TaskAction, TaskState
-from coordinator.allocate.routes import LaidRoutesAllocator, RoutesAllocator
+from coordinator.allocate.routes import RoutesAllocator
 from coordinator.allocate.simple import GreedyAllocator
 from coordinator.coordinator import Coordinator
 from coordinator.cut.cutter import Cutter
@@ -82,7 +82,7 @@ class TestByWhoseRoutesStripsAreLaid:
         return node._cutting[0]._fliers(replace(situation, **{"helpers": helpers, "deadline_s": 900.0, **of_situation}))
 
     def test_those_of_the_helpers_in_the_grids_own_frame_until_the_deadline(self) -> None:
-        node = told_of_run(allocator=LaidRoutesAllocator())
+        node = told_of_run(allocator=RoutesAllocator())
         (flier,) = self.fliers(node)
         state = node.fleet.vehicles[HELPER].state
         assert state is not None
@@ -95,11 +95,11 @@ class TestByWhoseRoutesStripsAreLaid:
     def test_nobodys_while_nobody_is_to_be_sent_to_a_strip_or_where_what_is_worth_most_is_to_be_removed_first(
         self,
     ) -> None:
-        assert self.fliers(told_of_run(allocator=LaidRoutesAllocator()), Mode.SURVEY) == []
-        assert self.fliers(told_of_run(allocator=LaidRoutesAllocator()), soonest=True) == []
+        assert self.fliers(told_of_run(allocator=RoutesAllocator()), Mode.SURVEY) == []
+        assert self.fliers(told_of_run(allocator=RoutesAllocator()), soonest=True) == []
 
     def test_nobodys_while_nobody_can_tell_when_the_mission_ends(self) -> None:
-        assert self.fliers(told_of_run(allocator=LaidRoutesAllocator()), deadline_s=math.inf) == []
+        assert self.fliers(told_of_run(allocator=RoutesAllocator()), deadline_s=math.inf) == []
 
     @pytest.mark.parametrize(
         ("of_helper", "helpers"),
@@ -114,15 +114,14 @@ class TestByWhoseRoutesStripsAreLaid:
     def test_nobodys_where_a_battery_may_end_before_the_mission_or_a_leg_lies_beside_its_strip(
         self, of_helper: dict[str, Any], helpers: int
     ) -> None:
-        assert len(self.fliers(told_of_run(allocator=LaidRoutesAllocator()), of_helper=of_helper)) == helpers
+        assert len(self.fliers(told_of_run(allocator=RoutesAllocator()), of_helper=of_helper)) == helpers
 
     def test_nobodys_where_the_allocator_does_not_say_so(self) -> None:
         assert self.fliers(told_of_run(allocator=GreedyAllocator())) == []
-        assert self.fliers(told_of_run(allocator=RoutesAllocator())) == []
 
     def test_nobodys_where_there_is_ground_to_keep_out_of(self) -> None:
         zone = Zone((Vertex(10, 10), Vertex(20, 10), Vertex(20, 30)))
-        assert self.fliers(told_of_run(replace(RUN, keep_out=(zone,)), allocator=LaidRoutesAllocator())) == []
+        assert self.fliers(told_of_run(replace(RUN, keep_out=(zone,)), allocator=RoutesAllocator())) == []
 
 
 @pytest.mark.parametrize(("sectors", "turns_each"), [(1, 1), (3, 3), (6, 4)])

@@ -40,7 +40,6 @@ IN_SHORT = [("five-helpers", name, (COARSE, *until(1000))) for name in ALLOCATOR
 OTHERS = [
     ("tellaro", "plan", (COARSE,)),
     ("two-helpers", "nearest", (COARSE,)),
-    ("two-helpers", "coordinator.allocate.routes:LaidRoutesAllocator", (COARSE,)),
     ("patchy", "auction", (COARSE,)),
     ("headland", "plan", (COARSE, *until(2500))),
 ]
