@@ -209,7 +209,7 @@ def test_who_is_sent_and_called_back_again_and_again_is_found(
 @pytest.mark.parametrize(
     ("name", "invariant"),
     [
-        ("the map forgets what a vehicle told before it was started anew", "risk never rises"),
+        ("the map forgets what a vehicle told before it was started anew", "the map is what came"),
         ("a strip is offered to two", "an offer is in the books"),
         ("a helper stays at a strip that it gives back", "who is told to give back does"),
     ],
