@@ -77,8 +77,8 @@ def offers_let_through(allocator: Allocator, situation: Situation, gate: Gate) -
     """The allocator's offers less those that must wait, and after how many seconds to ask again, infinite for never.
 
     The allocator is told what must wait, and how long, and asked again, until all that it offers may be made or waits
-    although it knows that. What must wait for long counts as refused. All of it holds for a helper that is to give its
-    task back, too: else it would circle in another's way.
+    although it knows that. What must wait for long counts as refused as well. All of it holds for a helper that is to
+    give its task back, too: else it would circle in another's way.
     """
     strips = {one.strip.number: one for one in situation.strips}
     again_s = math.inf
@@ -92,10 +92,9 @@ def offers_let_through(allocator: Allocator, situation: Situation, gate: Gate) -
             wait_s = gate.wait_s(helper, strips[number])
             if wait_s == 0:
                 passed.append((name, number))
-            elif math.isinf(wait_s):
-                told[name] = replace(helper, refused=helper.refused | {number})
             elif wait_s > helper.waits_s.get(number, 0.0):
-                told[name] = replace(helper, waits_s={**helper.waits_s, number: wait_s})
+                refused = helper.refused | {number} if math.isinf(wait_s) else helper.refused
+                told[name] = replace(helper, refused=refused, waits_s={**helper.waits_s, number: wait_s})
             if wait_s > 0:
                 again_s = min(again_s, wait_s, ASKED_LATER_S)
         if not told:

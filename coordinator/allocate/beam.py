@@ -27,7 +27,7 @@ class Found(NamedTuple):
     keeps. `alone_s`, `alone_m2`, (strips,): what each strip takes by itself, and what it brings beyond the worth of
     that time; `by_rate`, (strips,): their places in order of what they so bring a second, the most first, `rank`: of
     each its place in that order. `later_m2ps`: what a second is worth beyond that for which no strip is left, of
-    `later_s` at most.
+    `later_s` at most. `from_s`, `less_ps`: by what share a second a strip counts less that is begun later than this.
     """
 
     table: FloatArray
@@ -44,6 +44,8 @@ class Found(NamedTuple):
     rank: IntArray
     later_m2ps: float
     later_s: float
+    from_s: float
+    less_ps: float
 
 
 class Plans(NamedTuple):
@@ -136,7 +138,7 @@ def _search(team: Found, plans: Plans, ahead: Ahead, beam: int) -> IntArray:
 def _sample() -> tuple[Found, Plans, Ahead, int]:
     one, first = np.ones(1), np.zeros(1, dtype=np.int64)
     table, way = np.ones((1, 2, 4, 1)), np.zeros((1, 2, 1), dtype=np.int64)
-    team = Found(table, way, one, one, one, one, 1.0, one, one, one, first, first, 1.0, 1.0)
+    team = Found(table, way, one, one, one, one, 1.0, one, one, one, first, first, *np.ones(4))
     return team, *_room(team, 1), 1
 
 
@@ -238,7 +240,8 @@ def _gone_on(team: Found, plan: Plans, one: int, strip: int) -> tuple[float, flo
     ends_free_s = ends_s + team.run_out_s[one]
     spent_s = min(ends_free_s, team.deadline_s) - free_s
     share = min(max((team.deadline_s - begins_s) / sweep_s, 0.0), 1.0)
-    gained_m2 = share * found[3, strip] - spent_s * team.time_m2ps[one]
+    counts = share * (1.0 - team.less_ps * (begins_s - team.from_s)) if share > 0.0 else 0.0
+    gained_m2 = counts * found[3, strip] - spent_s * team.time_m2ps[one]
     return ends_free_s, spent_s, gained_m2 if gained_m2 > 0.0 else 0.0
 
 

@@ -16,6 +16,7 @@ nothing is planned: each helper is offered what brings most a second.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
@@ -31,6 +32,8 @@ from planner.types import FloatArray
 
 BEAM = 12
 """Plans carried from one strip to the next."""
+LONG_WAIT_S = 60.0
+"""So long is taken to be waited where nobody can tell how long it must be: what is shorter is told."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +62,7 @@ class RoutesAllocator:
         """See `Allocator`."""
         if situation.soonest:
             return GreedyAllocator().assign(situation)
-        helpers = sorted(situation.helpers, key=lambda one: one.vehicle)
+        helpers = sorted(map(_may_later, situation.helpers), key=lambda one: one.vehicle)
         if not situation.strips or all(one.sweeping for one in helpers):
             return {}
         deadline_s = min(situation.deadline_s, situation.now_s + HORIZON_S)
@@ -84,6 +87,14 @@ class RoutesAllocator:
             if is_better and route[0] != task.strip.number and route[0] not in offers.values():
                 offers[free.vehicle] = route[0]
         return offers
+
+
+def _may_later(helper: Helper) -> Helper:
+    """The same, which may set out after `LONG_WAIT_S` to strips to which it must wait for long: later in its route it
+    can serve them, and to wait for one may be better than to fly to another."""
+    for_long = [number for number, wait_s in helper.waits_s.items() if math.isinf(wait_s)]
+    waits_s = {**helper.waits_s, **dict.fromkeys(for_long, LONG_WAIT_S)}
+    return replace(helper, refused=helper.refused.difference(for_long), waits_s=waits_s)
 
 
 def _to_idle(situation: Situation, offers: Mapping[str, int]) -> Mapping[str, int]:

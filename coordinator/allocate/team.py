@@ -17,6 +17,9 @@ from planner.types import FloatArray, IntArray
 
 MOST_STRIPS = 32
 """So many strips are planned with, those that bring most for the time they take."""
+LESS_AT_DEADLINE = 0.02
+"""By what share a strip counts less that is begun at the deadline: before what comes late in a plan is flown it may be
+known to be worth less, and the plan be another. Of plans that bring as much the one is taken that brings it sooner."""
 LATER_SHARE = 0.5
 """Of what a second brings at the strip that is worth least: so much it is taken to bring at strips to come, as other
 looks at the same ground."""
@@ -75,11 +78,11 @@ class Team:
 
     def found(self, time_m2ps: FloatArray) -> Found:
         """The same as it is searched; `time_m2ps`: what a second is worth that each helper keeps."""
-        usual_m2ps = float(time_m2ps.mean())
+        usual_m2ps, free_s = float(time_m2ps.mean()), np.array([one.free_s for one in self.helpers], dtype=np.float64)
         return Found(
             table=self.table,
             way=self.way,
-            free_s=np.array([one.free_s for one in self.helpers], dtype=np.float64),
+            free_s=free_s,
             run_out_s=self.run_out_s,
             lasts_s=self.lasts_s,
             until_s=self.until_s,
@@ -91,6 +94,8 @@ class Team:
             rank=self.rank,
             later_m2ps=max(0.0, self.later_m2ps - usual_m2ps),
             later_s=HORIZON_S,
+            from_s=float(free_s.min()),
+            less_ps=LESS_AT_DEADLINE / max(self.deadline_s - float(free_s.min()), 1.0),
         )
 
     def flown(self, routes: Sequence[Sequence[int]]) -> tuple[float, list[float], dict[int, float]]:

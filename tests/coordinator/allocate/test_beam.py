@@ -55,9 +55,9 @@ DEADLINE_S = 385.0
 def found_by(
     jobs: Sequence[OpenStrip], helpers: Sequence[Helper], deadline_s: float = DEADLINE_S, price: float = 0.0
 ) -> Found:
-    """What helpers find; what their time is worth is told by a price for each metre."""
+    """What helpers find, if nothing counts less later; what their time is worth is told by a price for each metre."""
     team = Team(jobs, helpers, deadline_s)
-    return team.found(team.time_m2ps(price))
+    return team.found(team.time_m2ps(price))._replace(less_ps=0.0)
 
 
 def both(deadline_s: float = DEADLINE_S) -> Found:
@@ -132,6 +132,15 @@ def brings(team: Found, time_s: float, *without: int) -> float:
 
 
 class TestAhead:
+    def test_what_is_begun_later_counts_less(self) -> None:
+        # The near one from 50 s on and the far one from 300 s to 400 s, of which the deadline leaves 85 s.
+        team = Team(JOBS, [ALPHA, BETA], DEADLINE_S)
+        found = team.found(np.zeros(2))
+        assert found.from_s == 0.0
+        assert found.less_ps == pytest.approx(0.02 / DEADLINE_S)
+        _, ahead = look_ahead(found._replace(less_ps=0.001), begun(found))
+        assert ahead.gained_m2[0, :2].tolist() == pytest.approx([0.85 * 700 * (1 - 0.3), 700 * (1 - 0.05)])
+
     def test_who_is_free_first_may_serve_each_strip_from_where_it_is(self) -> None:
         team = both()
         plans = begun(team, 2)
@@ -185,10 +194,11 @@ class TestAhead:
         team = Team([NEAR], [ALPHA], 3600.0)
         (second_m2,) = team.time_m2ps(3.0)
         assert second_m2 > 0
-        found = team.found(team.time_m2ps(3.0))
+        found = found_by([NEAR], [ALPHA], 3600.0, 3.0)
         _, ahead = look_ahead(found, begun(found))
         assert ahead.gained_m2[0] == pytest.approx([700 - 152.5 * second_m2])
         late = Team([NEAR], [replace(ALPHA, free_s=400), replace(ALPHA, free_s=40)], 150.0).found(np.array([5.0, 2.0]))
+        late = late._replace(less_ps=0.0)
         nexts, ahead = look_ahead(late, begun(late))
         assert nexts == [1]
         assert ahead.gained_m2[0] == pytest.approx([700 * 0.6 - (150 - 40) * 2])

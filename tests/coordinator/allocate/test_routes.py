@@ -159,6 +159,18 @@ class TestOneHelper:
         assert found.strips == {"alpha": order}
         assert found.removed_m2 == pytest.approx(removed_m2)
 
+    def test_what_it_must_wait_for_for_long_it_serves_later_or_waits_for_rather_than_to_fly_far(self) -> None:
+        # 50 s from the near one, and 300 s from the far one; one beside the near one is as far as that.
+        waits = helper(waits_s={2: math.inf}, refused=frozenset({2}))
+        assert PLAN.assign(situation([NEAR, FAR], [waits])) == {"alpha": 2}
+        beside = open_strip(strip(1, x_m=50))
+        assert PLAN.assign(situation([NEAR, beside], [waits])) == {"alpha": 1}
+        assert GreedyAllocator().assign(situation([NEAR, FAR], [waits])) == {"alpha": 1}
+
+    def test_what_it_has_refused_it_is_not_offered_though_it_must_wait_for_another(self) -> None:
+        waits = helper(waits_s={2: math.inf, 1: 10.0}, refused=frozenset({1, 2}))
+        assert PLAN.assign(situation([NEAR, FAR], [waits])) == {"alpha": 2}
+
     def test_a_helper_at_work_goes_on_without_a_wait(self) -> None:
         # That is for one that were turned round.
         busy = at_work(helper(waits_s={1: 600.0}), NEAR)
@@ -444,6 +456,7 @@ class TestAgainstAllOrders:
         helpers, until_s = told.helpers[:2], min(told.deadline_s, HORIZON_S)
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(allocate.team, "LATER_SHARE", 0.0)
+            patch.setattr(allocate.team, "LESS_AT_DEADLINE", 0.0)
             found = plan_routes(told.strips, helpers, until_s, 200)
         assert found.removed_m2 == pytest.approx(most_m2(told.strips, helpers, until_s), rel=0.001)
 
@@ -458,6 +471,7 @@ class TestAgainstAllOrders:
         best_m2 = most_m2(told.strips, helpers, until_s)
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(allocate.team, "LATER_SHARE", 0.0)
+            patch.setattr(allocate.team, "LESS_AT_DEADLINE", 0.0)
             found = routes(told.strips, helpers, until_s)
         assert 0.95 * best_m2 <= found.removed_m2 <= best_m2 + 1e-3  # times are rounded
 
@@ -467,6 +481,7 @@ class TestAgainstAllOrders:
         until_s = min(told.deadline_s, HORIZON_S)
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(allocate.team, "LATER_SHARE", 0.0)
+            patch.setattr(allocate.team, "LESS_AT_DEADLINE", 0.0)
             found = routes(told.strips, told.helpers, until_s)
         assert found.removed_m2 >= by_rate_m2(told, until_s) - 1e-6
 
