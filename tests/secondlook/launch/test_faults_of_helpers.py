@@ -257,7 +257,7 @@ def check_of_last(flight: Flight) -> None:
 class TestBadLinks:
     def test_whose_answers_come_too_late_has_one_strip_at_a_time(self, tmp_path: Path) -> None:
         fleet = Fleet("two-helpers", folder=tmp_path, overrides=COARSE)
-        fleet.delay("coord/task/**", by_s=12)
+        fleet.delay("coord/task/**", by_s=20)
         flight = fleet.run()
         assert any(one.message.reason.endswith("is at it after all") for one in flight.said(StripStatus))
         assert_one_strip_at_a_time(flight)

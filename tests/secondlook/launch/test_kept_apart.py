@@ -83,7 +83,7 @@ class TestMissions:
         self, tmp_path: Path, capsys: pytest.CaptureFixture[str]
     ) -> None:
         fleet = Fleet(
-            "five-helpers", folder=tmp_path, overrides=("mission.separation_m=0", COARSE, *until(1500)), seed=1
+            "five-helpers", folder=tmp_path, overrides=("mission.separation_m=0", COARSE, *until(1800)), seed=2
         )
         flight = fleet.run()
         with pytest.raises(UserError, match=r"needs separation_m where mission\.separation_m of the scenario is 0"):

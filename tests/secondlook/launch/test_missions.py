@@ -191,7 +191,7 @@ class TestABadLink:
         assert mission.summary["risk"]["mean"] < mission.summary["risk_primary_alone"]["mean"] - 0.02
 
     def test_a_helper_cut_off_in_mid_strip_goes_on_with_it_when_it_is_heard_again(self) -> None:
-        cut_off = Faults(5, cut_offs=[CutOff("helper", 800_000, 860_000)])
+        cut_off = Faults(5, cut_offs=[CutOff("helper", 700_000, 760_000)])
         mission = fly_scenario(load_scenario("tellaro", [*HALF_THE_AREA, *ALONG_ALONE], 1), cut_off)
         reasons = [status.reason for _, status in mission.all(StripStatus)]
         assert "helper is lost: nothing heard of it" in reasons
