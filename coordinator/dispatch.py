@@ -20,6 +20,10 @@ from coordinator.outbox import NO_STRIP, Outbox
 from coordinator.strip_life import StripLife
 from planner.types import BoolArray, GridSpec, Point
 
+HELD_MS = 120_000
+"""Who has been free for so long, as it could not set out at once, does not wait any more: what it would wait for is one
+short wait after the other where a vehicle stays in the way."""
+
 
 class Dispatch:
     """Beside every allocator alike vehicles are kept apart, where the configuration wants that. `inside`: the area's
@@ -41,6 +45,8 @@ class Dispatch:
         self._agenda = agenda
         self._outbox = outbox
         lies_inside = partial(_lies_inside, fleet.map.grid, inside)
+        self._held_since_ms: dict[str, int] = {}
+        """Since when each free helper has been offered nothing, though there are strips."""
         self._right_of_way = None
         if config.separation_m > 0:
             self._right_of_way = RightOfWay(config.separation_m, lies_inside, fleet.keep_out)
@@ -62,11 +68,17 @@ class Dispatch:
             self._offer(checked_offers(self._allocator.assign(situation), situation), situation, now_ms)
             return
         departures = right.departures(self._under_way(), now_ms / 1000)
-        offers, again_s = offers_let_through(self._allocator, situation, departures)
+        impatient = [name for name, since_ms in self._held_since_ms.items() if now_ms - since_ms >= HELD_MS]
+        offers, again_s = offers_let_through(self._allocator, situation, departures, impatient)
         free = {helper.vehicle for helper in situation.free}
         for name, number in offers:
             if name in free:
                 right.offered(name, number, departures)
+        for helper in situation.helpers:
+            if helper.vehicle in free.difference(name for name, _ in offers):
+                self._held_since_ms.setdefault(helper.vehicle, now_ms)
+            else:
+                self._held_since_ms.pop(helper.vehicle, None)
         self._offer(offers, situation, now_ms)
         if math.isfinite(again_s):
             self._agenda.add(Item.ASSIGN, now_ms + round(again_s * 1000), sector)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 import reprlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, Protocol
@@ -73,12 +73,15 @@ def strip_number(who: str, vehicle: object, given: Any) -> int:
     return number
 
 
-def offers_let_through(allocator: Allocator, situation: Situation, gate: Gate) -> tuple[list[tuple[str, int]], float]:
+def offers_let_through(
+    allocator: Allocator, situation: Situation, gate: Gate, impatient: Collection[str] = ()
+) -> tuple[list[tuple[str, int]], float]:
     """The allocator's offers less those that must wait, and after how many seconds to ask again, infinite for never.
 
     The allocator is told what must wait, and how long, and asked again, until all that it offers may be made or waits
-    although it knows that. What must wait for long counts as refused as well. All of it holds for a helper that is to
-    give its task back, too: else it would circle in another's way.
+    although it knows that. What must wait for long counts as refused as well; by the `impatient`, which have waited for
+    long already, whatever must wait. All of it holds for a helper that is to give its task back, too: else it would
+    circle in another's way.
     """
     strips = {one.strip.number: one for one in situation.strips}
     again_s = math.inf
@@ -92,6 +95,8 @@ def offers_let_through(allocator: Allocator, situation: Situation, gate: Gate) -
             wait_s = gate.wait_s(helper, strips[number])
             if wait_s == 0:
                 passed.append((name, number))
+            elif name in impatient:
+                told[name] = replace(helper, refused=helper.refused | {number})
             elif wait_s > helper.waits_s.get(number, 0.0):
                 refused = helper.refused | {number} if math.isinf(wait_s) else helper.refused
                 told[name] = replace(helper, refused=refused, waits_s={**helper.waits_s, number: wait_s})

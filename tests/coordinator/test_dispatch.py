@@ -7,11 +7,12 @@ import math
 import numpy as np
 import pytest
 from by_hand import HELPER, PRIMARY, SECOND_HELPER
-from coordinator_by_hand import OFFERED, OPEN, TWO_HELPERS, Told, coordinator, with_a_helper
+from coordinator_by_hand import ELSEWHERE, OFFERED, OPEN, TWO_HELPERS, Told, coordinator, with_a_helper
 from one_node import Said
 
 from comms.said.messages import AgentState, Mode, Task, TaskAction, TaskState
 from coordinator.agenda import Item
+from coordinator.allocate.routes import RoutesAllocator
 from coordinator.allocate.simple import NoAllocator
 from coordinator.allocate.situation import Situation
 from coordinator.coordinator import Coordinator
@@ -106,6 +107,25 @@ def test_who_keeps_another_from_setting_out_stands_aside_and_that_is_offered_its
     told.status(HELPER, 1, TaskState.ACCEPTED)
     under_way = {one.name: None if one.strip is None else one.strip.number for one in node._dispatch._under_way()}
     assert under_way == {PRIMARY: None, HELPER: 1, SECOND_HELPER: None}
+
+
+def test_a_helper_does_not_wait_for_ever_for_what_another_stands_at() -> None:
+    # The primary circles on the strip to which it is 50 m; to the other it is 200 m.
+    told = coordinator(separation_m=15.0, idle=(), allocator=RoutesAllocator(), deadline_s=3600.0)
+
+    def say() -> None:
+        for name, mode, y_m in ((PRIMARY, Mode.SURVEY, 200.0), (HELPER, Mode.IDLE, 0.0)):
+            told.node.hear(f"agent/{name}/state", AgentState(mode, 0, 1.0, 0, 122.5, y_m, 0.0))
+
+    say()
+    told.hotspot()
+    told.hotspot(ELSEWHERE, number=2)
+    began_ms = told.node.now_ms + 1
+    for _ in range(13):
+        told.node.wait(10)
+        say()
+    assert told.tasks() == [(HELPER, TaskAction.TAKE, 2)]
+    assert said_tasks(told)[0].at_ms - began_ms == 120_000
 
 
 def said_tasks(told: Told) -> list[Said]:

@@ -13,6 +13,7 @@ from situations import helper, open_strip, situation, strip
 from comms.said.announcement import Role
 from comms.said.messages import AgentState, Mode, Plan, PlannedTrack
 from coordinator.allocate.allocators import ASKED_LATER_S, offers_let_through
+from coordinator.allocate.routes import RoutesAllocator
 from coordinator.allocate.simple import GreedyAllocator, NearestAllocator
 from coordinator.allocate.situation import Allocator, Helper, OpenStrip, Situation
 from coordinator.keep_apart.courses import too_close
@@ -62,6 +63,14 @@ class TestOffers:
         asked = situation([self.near, self.far], [helper()])
         assert offers_let_through(allocator, asked, Waits({1, 2}, 0)) == ([("alpha", 1)], math.inf)
         assert offers_let_through(allocator, asked, Waits({2}, math.inf)) == ([("alpha", 2)], ASKED_LATER_S)
+
+    def test_who_plans_routes_waits_for_the_near_one_unless_it_has_waited_for_long(self) -> None:
+        # The far one is 200 s farther on.
+        near, far = open_strip(strip(1, 0, 50)), open_strip(strip(2, 0, 650))
+        asked, gate = situation([near, far], [helper()]), Waits({2}, math.inf)
+        assert offers_let_through(RoutesAllocator(), asked, gate) == ([], ASKED_LATER_S)
+        assert offers_let_through(RoutesAllocator(), asked, gate, ["beta"]) == ([], ASKED_LATER_S)
+        assert offers_let_through(RoutesAllocator(), asked, gate, ["alpha"]) == ([("alpha", 2)], ASKED_LATER_S)
 
     def test_an_offer_that_is_clear_soon_waits(self) -> None:
         asked = situation([self.near, self.far], [helper()])
