@@ -20,9 +20,11 @@ from coordinator.outbox import NO_STRIP, Outbox
 from coordinator.strip_life import StripLife
 from planner.types import BoolArray, GridSpec, Point
 
-HELD_MS = 120_000
-"""Who has been free for so long, as it could not set out at once, does not wait any more: what it would wait for is one
-short wait after the other where a vehicle stays in the way."""
+WAITS_MS = 120_000
+"""Who has waited for so long for others at work to be out of its way does not wait any more: where a vehicle stays in
+the way one wait follows the other."""
+GAP_MS = 60_000
+"""What it was told so long before is not the same wait: meanwhile it was lost, or there was nothing to wait for."""
 
 
 class Dispatch:
@@ -45,8 +47,8 @@ class Dispatch:
         self._agenda = agenda
         self._outbox = outbox
         lies_inside = partial(_lies_inside, fleet.map.grid, inside)
-        self._held_since_ms: dict[str, int] = {}
-        """Since when each free helper has been offered nothing, though there are strips."""
+        self._waits_ms: dict[str, tuple[int, int]] = {}
+        """From when to when helpers that are free have been waiting for others at work."""
         self._right_of_way = None
         if config.separation_m > 0:
             self._right_of_way = RightOfWay(config.separation_m, lies_inside, fleet.keep_out)
@@ -68,20 +70,20 @@ class Dispatch:
             self._offer(checked_offers(self._allocator.assign(situation), situation), situation, now_ms)
             return
         departures = right.departures(self._under_way(), now_ms / 1000)
-        impatient = [name for name, since_ms in self._held_since_ms.items() if now_ms - since_ms >= HELD_MS]
-        offers, again_s = offers_let_through(self._allocator, situation, departures, impatient)
+        self._waits_ms = {name: wait for name, wait in self._waits_ms.items() if now_ms - wait[1] < GAP_MS}
+        impatient = [name for name, (since_ms, _) in self._waits_ms.items() if now_ms - since_ms >= WAITS_MS]
+        through = offers_let_through(self._allocator, situation, departures, impatient)
         free = {helper.vehicle for helper in situation.free}
-        for name, number in offers:
+        for name, number in through.offers:
             if name in free:
                 right.offered(name, number, departures)
         for helper in situation.helpers:
-            if helper.vehicle in free.difference(name for name, _ in offers):
-                self._held_since_ms.setdefault(helper.vehicle, now_ms)
-            else:
-                self._held_since_ms.pop(helper.vehicle, None)
-        self._offer(offers, situation, now_ms)
-        if math.isfinite(again_s):
-            self._agenda.add(Item.ASSIGN, now_ms + round(again_s * 1000), sector)
+            since_ms, _ = self._waits_ms.pop(helper.vehicle, (now_ms, now_ms))
+            if helper.vehicle in through.waiting & free and helper.free_s <= situation.now_s:
+                self._waits_ms[helper.vehicle] = since_ms, now_ms
+        self._offer(through.offers, situation, now_ms)
+        if math.isfinite(through.again_s):
+            self._agenda.add(Item.ASSIGN, now_ms + round(through.again_s * 1000), sector)
         self._instruct(right.make_room(departures, self._under_way()), now_ms)
 
     def keep_apart(self, now_ms: int) -> None:

@@ -62,7 +62,7 @@ class StripCutting:
             min_strip_m=config.min_strip_m,
             max_strip_m=config.max_strip_m,
         )
-        self._lays = getattr(config.allocator, "lays_strips", False) is True
+        self._lays = config.strips == "reacting" and getattr(config.allocator, "lays_strips", False) is True
         self._objective = OBJECTIVES[config.objective]
         grid = sector.expected.grid
         area_m2 = grid.cell_area_m2

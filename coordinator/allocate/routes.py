@@ -10,13 +10,12 @@ That estimate pools the helpers' time, as if two of them could fly half a strip 
 will cut off. So which plan is taken is decided otherwise: each one kept on the way is gone on with to the deadline by
 what brings most a second, and of all that come of it the best is taken.
 
-A plan to the deadline does not care what comes first. So where the mission is expected to end before, with its goal,
-nothing is planned: each helper is offered what brings most a second.
+A plan to the deadline hardly cares what comes first: what comes last counts 2 % less. So where the mission is expected
+to end before, with its goal, nothing is planned: each helper is offered what brings most a second.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
@@ -32,8 +31,6 @@ from planner.types import FloatArray
 
 BEAM = 12
 """Plans carried from one strip to the next."""
-LONG_WAIT_S = 60.0
-"""So long is taken to be waited where nobody can tell how long it must be: what is shorter is told."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +59,7 @@ class RoutesAllocator:
         """See `Allocator`."""
         if situation.soonest:
             return GreedyAllocator().assign(situation)
-        helpers = sorted(map(_may_later, situation.helpers), key=lambda one: one.vehicle)
+        helpers = sorted((_may_later(one, situation.now_s) for one in situation.helpers), key=lambda one: one.vehicle)
         if not situation.strips or all(one.sweeping for one in helpers):
             return {}
         deadline_s = min(situation.deadline_s, situation.now_s + HORIZON_S)
@@ -89,17 +86,17 @@ class RoutesAllocator:
         return offers
 
 
-def _may_later(helper: Helper) -> Helper:
-    """The same, which may set out after `LONG_WAIT_S` to strips to which it must wait for long: later in its route it
-    can serve them, and to wait for one may be better than to fly to another."""
-    for_long = [number for number, wait_s in helper.waits_s.items() if math.isinf(wait_s)]
-    waits_s = {**helper.waits_s, **dict.fromkeys(for_long, LONG_WAIT_S)}
-    return replace(helper, refused=helper.refused.difference(for_long), waits_s=waits_s)
+def _may_later(helper: Helper, now_s: float) -> Helper:
+    """The same, and if it is free now, it may set out after a wait to strips to which that must be long: later in its
+    route it can serve them, and to wait for one may be better than to fly to another."""
+    if helper.task is not None or helper.free_s > now_s:
+        return helper
+    return replace(helper, refused=helper.refused.difference(helper.waits_s))
 
 
 def _to_idle(situation: Situation, offers: Mapping[str, int]) -> Mapping[str, int]:
     """What is offered to free helpers whose routes are empty, as better ones would serve all in time: what those are
-    sent to later. Nobody waits while anything is worth looking at."""
+    sent to later. Who has no route does not wait while anything is worth looking at."""
     idle = tuple(one for one in situation.free if one.vehicle not in offers)
     strips = tuple(one for one in situation.strips if one.strip.number not in offers.values())
     return GreedyAllocator().assign(replace(situation, helpers=idle, strips=strips))

@@ -274,7 +274,8 @@ class Departures:
     """Judges the offers of one moment, one after the other: an offer agreed on is in the next one's way.
 
     `ways`: by helper and strip the strip, the course there and the sweep; `sweeps_s`: when that begins. `in_the_way`:
-    free helpers that keep another from setting out, and its course.
+    free helpers that keep another from setting out, and its course. `blocked`: by helper and strip the offers that must
+    wait as who is at work is in the way.
     """
 
     def __init__(self, separation_m: float, traffic: Traffic, fleet: Sequence[Underway], now_s: float) -> None:
@@ -283,6 +284,7 @@ class Departures:
         self.ways: dict[tuple[str, int], tuple[Strip, Course, Sweep]] = {}
         self.sweeps_s: dict[tuple[str, int], float] = {}
         self.in_the_way: list[tuple[str, Course]] = []
+        self.blocked: set[tuple[str, int]] = set()
         self._least_m, self._soon_m = separation_m + OFFER_MARGIN_M, separation_m + SOON_MARGIN_M
         self._traffic = traffic
         self._agreed: dict[str, Course] = {}
@@ -291,6 +293,7 @@ class Departures:
         """All offers are judged anew."""
         self._agreed.clear()
         self.in_the_way.clear()
+        self.blocked.clear()
 
     def wait_s(self, helper: Helper, one: OpenStrip) -> float:
         """How long the helper has to wait before it may set out to a strip, from what it does if it does anything; 0
@@ -319,6 +322,7 @@ class Departures:
         for delay_s in DELAYS_S:
             later = course.later(round(delay_s / STEP_S)) if delay_s else course
             if any(self._meet(later, its, from_s, until_s + delay_s) for its in busy):
+                self.blocked.add((name, one.strip.number))
                 continue
             blocking = [who for who, its in free.items() if self._meet(later, its, from_s, from_s + STANDS_ASIDE_S)]
             self.in_the_way += [(who, course) for who in blocking]

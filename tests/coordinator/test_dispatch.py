@@ -16,7 +16,7 @@ from coordinator.allocate.routes import RoutesAllocator
 from coordinator.allocate.simple import NoAllocator
 from coordinator.allocate.situation import Situation
 from coordinator.coordinator import Coordinator
-from coordinator.dispatch import _lies_inside
+from coordinator.dispatch import WAITS_MS, _lies_inside
 from coordinator.fixed import FixedRoutes
 from coordinator.keep_apart.right_of_way import Instruction
 from planner.types import GridSpec, Point, SweepFrame
@@ -109,23 +109,63 @@ def test_who_keeps_another_from_setting_out_stands_aside_and_that_is_offered_its
     assert under_way == {PRIMARY: None, HELPER: 1, SECOND_HELPER: None}
 
 
-def test_a_helper_does_not_wait_for_ever_for_what_another_stands_at() -> None:
-    # The primary circles on the strip to which it is 50 m; to the other it is 200 m.
+def beside_one_that_stays() -> Told:
+    """The primary has told no plan yet, and circles on the strip of `HOT`, to which the helper has 50 m to go."""
     told = coordinator(separation_m=15.0, idle=(), allocator=RoutesAllocator(), deadline_s=3600.0)
+    stay(told, 1)
+    return told
 
-    def say() -> None:
+
+def stay(told: Told, seconds: int) -> None:
+    """Lets time pass."""
+    for _ in range(max(1, seconds // 10)):
+        told.node.wait(min(10, seconds))
         for name, mode, y_m in ((PRIMARY, Mode.SURVEY, 200.0), (HELPER, Mode.IDLE, 0.0)):
             told.node.hear(f"agent/{name}/state", AgentState(mode, 0, 1.0, 0, 122.5, y_m, 0.0))
 
-    say()
+
+def test_a_helper_does_not_wait_for_ever_for_what_another_stands_at() -> None:
+    told = beside_one_that_stays()
     told.hotspot()
-    told.hotspot(ELSEWHERE, number=2)
+    told.hotspot(ELSEWHERE, number=2)  # 200 m away
     began_ms = told.node.now_ms + 1
-    for _ in range(13):
-        told.node.wait(10)
-        say()
+    stay(told, 130)
     assert told.tasks() == [(HELPER, TaskAction.TAKE, 2)]
     assert said_tasks(told)[0].at_ms - began_ms == 120_000
+
+
+def test_a_wait_begins_anew_where_there_was_nothing_to_wait_for() -> None:
+    told = beside_one_that_stays()
+    node = told.node.node
+    assert isinstance(node, Coordinator)
+
+    def waits_s() -> float:
+        ((since_ms, until_ms),) = node._dispatch._waits_ms.values()
+        return (until_ms - since_ms) / 1000
+
+    told.hotspot()
+    stay(told, 50)
+    assert waits_s() >= 40
+    told.hotspot(None, revision=2)
+    stay(told, 60)
+    told.hotspot(number=2)
+    stay(told, 20)
+    assert waits_s() <= 20
+
+
+def test_whom_one_at_work_has_kept_waiting_and_now_one_that_is_free_goes_once_that_has_made_room() -> None:
+    told = coordinator(TWO_HELPERS, separation_m=15.0, idle=(), allocator=RoutesAllocator(), deadline_s=3600.0)
+    node = told.node.node
+    assert isinstance(node, Coordinator)
+    for name, mode, y_m in ((PRIMARY, Mode.SURVEY, 0.0), (HELPER, Mode.IDLE, 0.0), (SECOND_HELPER, Mode.IDLE, 100.0)):
+        x_m = 350.0 if name == PRIMARY else 122.5
+        told.node.hear(f"agent/{name}/state", AgentState(mode, 0, 1.0, 0, x_m, y_m, 0.0))
+    node.fleet.vehicles[SECOND_HELPER].failures = 3  # it is given nothing more
+    now_ms = told.node.now_ms
+    node._dispatch._waits_ms[HELPER] = now_ms - WAITS_MS, now_ms
+    told.hotspot()
+    told.node.wait(11)
+    assert told.tasks() == [(SECOND_HELPER, TaskAction.STAND_ASIDE, 0), (HELPER, TaskAction.TAKE, 1)]
 
 
 def said_tasks(told: Told) -> list[Said]:

@@ -116,6 +116,9 @@ class TestByWhoseRoutesStripsAreLaid:
     ) -> None:
         assert len(self.fliers(told_of_run(allocator=RoutesAllocator()), of_helper=of_helper)) == helpers
 
+    def test_nobodys_where_routes_are_fixed_beforehand_whoever_the_allocator_is(self) -> None:
+        assert self.fliers(told_of_run(allocator=RoutesAllocator(), strips="beforehand")) == []
+
     def test_nobodys_where_the_allocator_does_not_say_so(self) -> None:
         assert self.fliers(told_of_run(allocator=GreedyAllocator())) == []
 

@@ -20,7 +20,7 @@ from coordinator.allocate.beam import LEAST_S
 from coordinator.allocate.routes import BEAM, Routes, RoutesAllocator, plan_each, plan_routes
 from coordinator.allocate.service import StripTable, expected_service, removed_m2
 from coordinator.allocate.simple import GreedyAllocator
-from coordinator.allocate.situation import HORIZON_S, Helper, OpenStrip, Situation
+from coordinator.allocate.situation import HORIZON_S, LONG_WAIT_S, Helper, OpenStrip, Situation
 from coordinator.allocate.team import MOST_STRIPS, Team
 from planner.currents import Sailing
 from planner.dubins import Pose
@@ -161,15 +161,15 @@ class TestOneHelper:
 
     def test_what_it_must_wait_for_for_long_it_serves_later_or_waits_for_rather_than_to_fly_far(self) -> None:
         # 50 s from the near one, and 300 s from the far one; one beside the near one is as far as that.
-        waits = helper(waits_s={2: math.inf}, refused=frozenset({2}))
+        waits = helper(waits_s={2: LONG_WAIT_S}, refused=frozenset({2}))
         assert PLAN.assign(situation([NEAR, FAR], [waits])) == {"alpha": 2}
         beside = open_strip(strip(1, x_m=50))
         assert PLAN.assign(situation([NEAR, beside], [waits])) == {"alpha": 1}
         assert GreedyAllocator().assign(situation([NEAR, FAR], [waits])) == {"alpha": 1}
 
     def test_what_it_has_refused_it_is_not_offered_though_it_must_wait_for_another(self) -> None:
-        waits = helper(waits_s={2: math.inf, 1: 10.0}, refused=frozenset({1, 2}))
-        assert PLAN.assign(situation([NEAR, FAR], [waits])) == {"alpha": 2}
+        waits = helper(waits_s={1: LONG_WAIT_S}, refused=frozenset({1, 2}))
+        assert PLAN.assign(situation([NEAR, FAR], [waits])) == {"alpha": 1}
 
     def test_a_helper_at_work_goes_on_without_a_wait(self) -> None:
         # That is for one that were turned round.

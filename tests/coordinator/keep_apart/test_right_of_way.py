@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import pytest
@@ -12,7 +12,7 @@ from situations import helper, open_strip, situation, strip
 
 from comms.said.announcement import Role
 from comms.said.messages import AgentState, Mode, Plan, PlannedTrack
-from coordinator.allocate.allocators import ASKED_LATER_S, offers_let_through
+from coordinator.allocate.allocators import ASKED_LATER_S, Gate, offers_let_through
 from coordinator.allocate.routes import RoutesAllocator
 from coordinator.allocate.simple import GreedyAllocator, NearestAllocator
 from coordinator.allocate.situation import Allocator, Helper, OpenStrip, Situation
@@ -43,16 +43,29 @@ def right_of_way() -> RightOfWay:
 
 
 class Waits:
-    """Lets these strips through, and the others only after so many seconds."""
+    """Lets these strips through, and the others only after so many seconds: as somebody at work is in the way, or, for
+    some, somebody who is free."""
 
-    def __init__(self, through: set[int], wait_s: float) -> None:
-        self.through, self.seconds = through, wait_s
+    def __init__(self, through: set[int], wait_s: float, for_free: Collection[int] = ()) -> None:
+        self.through, self.seconds, self.for_free = through, wait_s, for_free
+        self.blocked = set[tuple[str, int]]()
 
     def begin(self) -> None:
-        pass
+        self.blocked.clear()
 
     def wait_s(self, helper: Helper, one: OpenStrip) -> float:
-        return 0.0 if one.strip.number in self.through else self.seconds
+        if one.strip.number in self.through:
+            return 0.0
+        if one.strip.number not in self.for_free:
+            self.blocked.add((helper.vehicle, one.strip.number))
+        return self.seconds
+
+
+def let_through(
+    allocator: Allocator, asked: Situation, gate: Gate, impatient: Sequence[str] = ()
+) -> tuple[list[tuple[str, int]], float]:
+    found = offers_let_through(allocator, asked, gate, impatient)
+    return found.offers, found.again_s
 
 
 class TestOffers:
@@ -61,20 +74,42 @@ class TestOffers:
     @pytest.mark.parametrize("allocator", [GreedyAllocator(), NearestAllocator()])
     def test_another_strip_is_taken_where_one_must_wait_long(self, allocator: Allocator) -> None:
         asked = situation([self.near, self.far], [helper()])
-        assert offers_let_through(allocator, asked, Waits({1, 2}, 0)) == ([("alpha", 1)], math.inf)
-        assert offers_let_through(allocator, asked, Waits({2}, math.inf)) == ([("alpha", 2)], ASKED_LATER_S)
+        assert let_through(allocator, asked, Waits({1, 2}, 0)) == ([("alpha", 1)], math.inf)
+        assert let_through(allocator, asked, Waits({2}, math.inf)) == ([("alpha", 2)], ASKED_LATER_S)
 
     def test_who_plans_routes_waits_for_the_near_one_unless_it_has_waited_for_long(self) -> None:
         # The far one is 200 s farther on.
         near, far = open_strip(strip(1, 0, 50)), open_strip(strip(2, 0, 650))
         asked, gate = situation([near, far], [helper()]), Waits({2}, math.inf)
-        assert offers_let_through(RoutesAllocator(), asked, gate) == ([], ASKED_LATER_S)
-        assert offers_let_through(RoutesAllocator(), asked, gate, ["beta"]) == ([], ASKED_LATER_S)
-        assert offers_let_through(RoutesAllocator(), asked, gate, ["alpha"]) == ([("alpha", 2)], ASKED_LATER_S)
+        assert let_through(RoutesAllocator(), asked, gate) == ([], ASKED_LATER_S)
+        assert let_through(RoutesAllocator(), asked, gate, ["beta"]) == ([], ASKED_LATER_S)
+        assert let_through(RoutesAllocator(), asked, gate, ["alpha"]) == ([("alpha", 2)], ASKED_LATER_S)
+
+    def test_while_it_goes_on_with_another_or_is_to_be_turned_round_it_takes_the_far_one(self) -> None:
+        near, far = open_strip(strip(1, 0, 50)), open_strip(strip(2, 0, 650))
+        asked = situation([near, far], [helper(free_s=30)])
+        assert let_through(RoutesAllocator(), asked, Waits({2}, math.inf)) == ([("alpha", 2)], ASKED_LATER_S)
+
+    @pytest.mark.parametrize("allocator", [GreedyAllocator(), NearestAllocator(), RoutesAllocator()])
+    def test_who_has_waited_for_long_gets_the_one_way_that_is_clear_of_many(self, allocator: Allocator) -> None:
+        asked = situation([open_strip(strip(number, 0, 50 * number)) for number in range(1, 10)], [helper()])
+        assert let_through(allocator, asked, Waits({9}, 10.0)) == ([], 10.0)
+        assert let_through(allocator, asked, Waits({9}, 10.0), ["alpha"]) == ([("alpha", 9)], 10.0)
+
+    def test_for_who_is_free_it_goes_on_waiting_as_that_makes_room(self) -> None:
+        asked = situation([self.near, self.far], [helper()])
+        found = offers_let_through(GreedyAllocator(), asked, Waits(set(), 10.0, {1, 2}), ["alpha"])
+        assert (found.offers, found.again_s, found.waiting) == ([], 10.0, frozenset())
+
+    def test_it_is_told_who_waits_for_somebody_at_work(self) -> None:
+        asked = situation([self.near, self.far], [helper(), helper("beta", x_m=300)])
+        found = offers_let_through(NearestAllocator(), asked, Waits({2}, 10.0))
+        assert found.offers == [("beta", 2)]
+        assert found.waiting == {"alpha"}
 
     def test_an_offer_that_is_clear_soon_waits(self) -> None:
         asked = situation([self.near, self.far], [helper()])
-        assert offers_let_through(GreedyAllocator(), asked, Waits({2}, 10)) == ([], 10)
+        assert let_through(GreedyAllocator(), asked, Waits({2}, 10)) == ([], 10)
 
     def test_an_allocator_is_told_how_long_a_helper_must_wait_for_each_strip_that_it_gives_it(self) -> None:
         told = list[Mapping[int, float]]()
@@ -85,7 +120,7 @@ class TestOffers:
                 return {"alpha": len(told)}
 
         asked = situation([open_strip(strip(number)) for number in (1, 2, 3)], [helper()])
-        assert offers_let_through(Takes(), asked, Waits({3}, 40)) == ([("alpha", 3)], ASKED_LATER_S)
+        assert let_through(Takes(), asked, Waits({3}, 40)) == ([("alpha", 3)], ASKED_LATER_S)
         assert told == [{}, {1: 40}, {1: 40, 2: 40}]
 
     @pytest.mark.parametrize(("wait_s", "offers", "again_s"), [(10, [], 10), (60, [("alpha", 2)], ASKED_LATER_S)])
@@ -95,7 +130,7 @@ class TestOffers:
         # Done after 75 s and the wait the first removes 700 m2, the second 350 m2 after 50 s.
         better, soon = open_strip(strip(1, 0, 50, 100), 1000), open_strip(strip(2, 0, 50, 50), 500)
         asked = situation([better, soon], [helper()])
-        assert offers_let_through(GreedyAllocator(), asked, Waits({2}, wait_s)) == (offers, again_s)
+        assert let_through(GreedyAllocator(), asked, Waits({2}, wait_s)) == (offers, again_s)
 
     def test_an_allocator_that_takes_no_notice_of_waits_waits_but_not_for_long(self) -> None:
         class LowestFirst:
@@ -104,8 +139,8 @@ class TestOffers:
                 return {"alpha": min(one.strip.number for one in asked.strips if one.strip.number not in alpha.refused)}
 
         asked = situation([open_strip(strip(number)) for number in (1, 2, 3)], [helper()])
-        assert offers_let_through(LowestFirst(), asked, Waits({3}, math.inf)) == ([("alpha", 3)], ASKED_LATER_S)
-        assert offers_let_through(LowestFirst(), asked, Waits({3}, 60)) == ([], ASKED_LATER_S)
+        assert let_through(LowestFirst(), asked, Waits({3}, math.inf)) == ([("alpha", 3)], ASKED_LATER_S)
+        assert let_through(LowestFirst(), asked, Waits({3}, 60)) == ([], ASKED_LATER_S)
 
     def test_an_allocator_that_insists_gets_nothing(self) -> None:
         class Insists:
@@ -113,14 +148,14 @@ class TestOffers:
                 return {"alpha": 1}
 
         asked = situation([self.near], [helper()])
-        assert offers_let_through(Insists(), asked, Waits(set(), math.inf)) == ([], ASKED_LATER_S)
+        assert let_through(Insists(), asked, Waits(set(), math.inf)) == ([], ASKED_LATER_S)
 
     @pytest.mark.parametrize(("clear", "offers"), [(6, [("alpha", 6)]), (7, [])])
     def test_an_allocator_is_asked_six_times_for_one_that_may_be_offered(
         self, clear: int, offers: list[tuple[str, int]]
     ) -> None:
         asked = situation([open_strip(strip(number, 100 * number)) for number in range(1, 9)], [helper()])
-        assert offers_let_through(NearestAllocator(), asked, Waits({clear}, math.inf)) == (offers, ASKED_LATER_S)
+        assert let_through(NearestAllocator(), asked, Waits({clear}, math.inf)) == (offers, ASKED_LATER_S)
 
     def test_a_helper_gives_its_task_back_only_where_the_way_to_the_other_is_clear(self) -> None:
         class TurnsRound:
@@ -129,8 +164,8 @@ class TestOffers:
 
         busy = replace(helper(), task=self.far)
         asked = situation([self.near], [busy])
-        assert offers_let_through(TurnsRound(), asked, Waits({1}, 0)) == ([("alpha", 1)], math.inf)
-        assert offers_let_through(TurnsRound(), asked, Waits(set(), math.inf)) == ([], ASKED_LATER_S)
+        assert let_through(TurnsRound(), asked, Waits({1}, 0)) == ([("alpha", 1)], math.inf)
+        assert let_through(TurnsRound(), asked, Waits(set(), math.inf)) == ([], ASKED_LATER_S)
 
 
 class TestDepartures:
