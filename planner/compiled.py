@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import sys
 from collections.abc import Callable, Sequence
 from functools import cached_property, update_wrapper
 from pathlib import Path
@@ -17,6 +18,8 @@ from typing import Any, Generic, ParamSpec, TypeVar
 
 P = ParamSpec("P")
 R = TypeVar("R")
+
+BLAS = "scipy.linalg.cython_blas"
 
 
 class Compiled(Generic[P, R]):
@@ -50,6 +53,7 @@ class Compiled(Generic[P, R]):
         numba.extending.typeof_impl.register(Compiled)(_type_of)
         made = numba.njit(self._function)
         if not numba.config.DISABLE_JIT:
+            _load_arrays()
             with contextlib.suppress(RuntimeError):  # nowhere to keep it
                 made._cache = _cache(self._function)
         return made
@@ -73,6 +77,17 @@ def compile_all() -> None:
     while _called:
         one, sample = _called.pop()
         one(*sample())
+
+
+def _load_arrays() -> None:
+    """Loads what numba knows of arrays without looking for scipy's BLAS, which takes each process 0.1 s where scipy
+    is installed: it has to know so early of convolutions and correlations alone, which add up by themselves without."""
+    if BLAS not in sys.modules:
+        sys.modules[BLAS] = None  # type: ignore[assignment]  # as if scipy were not there
+        try:
+            import numba.np.arraymath  # noqa: F401, PLC0415, see the class
+        finally:
+            del sys.modules[BLAS]
 
 
 def _type_of(one: Compiled[..., Any], _: Any) -> Any:

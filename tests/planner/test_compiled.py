@@ -177,6 +177,20 @@ def test_who_calls_nothing_compiled_does_not_import_numba() -> None:
     assert told == "False"
 
 
+@needs_compiling
+def test_blas_is_not_loaded_for_what_is_ours_and_is_there_for_a_users() -> None:
+    told = in_a_new_process(
+        "import sys\n"
+        "import planner.risk\n"
+        "from planner.compiled import compile_all\n"
+        "compile_all()\n"
+        "print('numba.np.arraymath' in sys.modules, 'scipy.linalg' in sys.modules)\n"
+        "import numba, numpy\n"
+        "print(numba.njit(lambda one: numpy.dot(one, one))(2 * numpy.eye(2)).trace(), 'scipy.linalg' in sys.modules)\n"
+    )
+    assert told == "True False\n8.0 True"
+
+
 def test_what_is_compiled_already_is_not_asked_for_again() -> None:
     calls = list[int]()
 
