@@ -20,7 +20,8 @@ def main() -> None:
     folder.mkdir()
     scenario = load_scenario(str(Path(__file__).with_name("brief.yaml")), sys.argv[3:])
     drive = ByWallClock(factor, may_be_late_s=scenario.coordinator.lost_after_s) if factor else Lockstep()
-    run_mission(scenario, RunOptions(folder, drive=drive, record=False, patience_s=PATIENCE_S))
+    processes = None if factor else 2  # each takes half a second to start
+    run_mission(scenario, RunOptions(folder, processes=processes, drive=drive, record=False, patience_s=PATIENCE_S))
 
 
 if __name__ == "__main__":

@@ -61,4 +61,5 @@ def test_what_is_kept_with_the_run_flies_the_same_mission_on_both_buses(tmp_path
     (tmp_path / "flows.csv").unlink()
     again = load_scenario(flight.folder / "scenario.yaml")
     assert isinstance(again.current, GridCurrent)
-    assert assert_repeats(Fleet(again, folder=tmp_path), ("local", "zenoh")).digest == flight.digest
+    fleet = Fleet(again, folder=tmp_path, bus="zenoh", processes=2)
+    assert assert_repeats(fleet, ("local", "zenoh")).digest == flight.digest

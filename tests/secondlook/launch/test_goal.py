@@ -28,7 +28,8 @@ LANE = "mission.goal={kind: lane, lane_m: [[50, 10], [50, 90]], width_m: 20, ris
 
 
 def test_it_ends_with_its_goal_on_both_buses_alike(tmp_path: Path) -> None:
-    flight = assert_repeats(Fleet(load_scenario(str(BRIEF), [SOME]), folder=tmp_path), ("local", "zenoh"))
+    fleet = Fleet(load_scenario(str(BRIEF), [SOME]), folder=tmp_path, bus="zenoh", processes=2)
+    flight = assert_repeats(fleet, ("local", "zenoh"))
     (over,) = {one.message.reason for one in flight.said(MissionOver)}
     assert over.startswith("the goal is reached: a clearance of 0.3 with a chance of 0.9; the chance is ")
     assert flight.summary["time"]["mission_s"] < 100.0  # the whole one takes 111 s

@@ -78,10 +78,15 @@ def assert_failed(flying: Flight, code: int, out: str, err: str, said: str) -> N
     assert sum(summary["messages"].values()) == len(read_messages(flying.folder / "messages.mpk"))
 
 
-@pytest.mark.parametrize("host", ["world", "coordinator", "recorder"])  # the hub, one that acts, one that only listens
-def test_a_killed_process_ends_the_run_with_a_sentence_that_names_it(tmp_path: Path, host: str) -> None:
-    with flight(tmp_path / "out", *LONG) as flying:
-        children = take_off(flying)
+@pytest.mark.parametrize(
+    ("host", "options", "hosts"),  # the hub, one that acts, one that only listens
+    [("world", FEW, FEW_HOSTS), ("coordinator", (), HOSTS), ("recorder", FEW, FEW_HOSTS)],
+)
+def test_a_killed_process_ends_the_run_with_a_sentence_that_names_it(
+    tmp_path: Path, host: str, options: Sequence[str], hosts: Sequence[str]
+) -> None:
+    with flight(tmp_path / "out", *LONG, *options) as flying:
+        children = take_off(flying, hosts)
         os.kill(children[host], signal.SIGKILL)
         printed = flying.finish(SOON_S)
         assert_gone(flying, children)

@@ -7,6 +7,7 @@ import os
 import re
 import signal
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -85,10 +86,10 @@ def assert_failed(flying: Flight, said: str, children: dict[str, int]) -> None:
     assert events(flying.folder)
 
 
-@pytest.mark.parametrize("host", ["world", "helper"])
-def test_a_killed_process_ends_the_run(tmp_path: Path, host: str) -> None:
-    with flight(tmp_path / "out", *SLOW) as flying:
-        children = take_off(flying)
+@pytest.mark.parametrize(("host", "options", "hosts"), [("world", ("--processes", "1"), 2), ("helper", (), 5)])
+def test_a_killed_process_ends_the_run(tmp_path: Path, host: str, options: Sequence[str], hosts: int) -> None:
+    with flight(tmp_path / "out", *SLOW, *options) as flying:
+        children = take_off(flying, hosts)
         os.kill(children[host], signal.SIGKILL)
         assert_failed(flying, rf"{host} was killed by SIGKILL( at \d+\.\d{{3}} s of the mission)?", children)
 
@@ -101,7 +102,8 @@ def test_ctrl_c_ends_the_run(tmp_path: Path) -> None:
 
 
 def test_a_mission_that_is_not_over_in_time_fails_and_says_so(tmp_path: Path) -> None:
-    with flight(tmp_path / "out", *FAST, "--anyway", "--set", "mission.time_limit_s=20", "--no-record") as flying:
+    limited = ("--anyway", "--set", "mission.time_limit_s=20", "--no-record", "--processes", "1")
+    with flight(tmp_path / "out", *FAST, *limited) as flying:
         code, _, err = flying.finish()
     said = "the mission is not over at its time limit, mission.time_limit_s: 20"
     assert (code, err) == (1, f"{said}; what was recorded is in {flying.folder}\n")

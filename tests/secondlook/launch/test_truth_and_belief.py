@@ -71,7 +71,8 @@ def test_what_is_true_of_targets_changes_nothing_that_agents_do() -> None:
 
 
 def test_both_buses_fly_one_mission_with_all_of_it(tmp_path: Path) -> None:
-    flight = assert_repeats(Fleet(load_scenario(str(BRIEF), ODD), folder=tmp_path), ("local", "zenoh"))
+    fleet = Fleet(load_scenario(str(BRIEF), ODD), folder=tmp_path, bus="zenoh", processes=2)
+    flight = assert_repeats(fleet, ("local", "zenoh"))
     assert flight.summary["at_odds"] == TOLD
     assert_maps_converged(replace(flight, inside=None))  # with its looks, as they count by its rho
     own = [p for one in flight.said(TruthLook) for p in one.message.p_detect.tolist()]
