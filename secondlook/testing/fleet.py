@@ -115,7 +115,7 @@ class Fleet(Trouble):
         self,
         scenario: ScenarioSource = "tellaro",
         *,
-        folder: Path,
+        folder: str | os.PathLike[str],
         overrides: Overrides = (),
         seed: int | None = None,
         bus: Bus = "local",
@@ -130,12 +130,14 @@ class Fleet(Trouble):
         fault_seed = _whole("fault_seed", fault_seed, 0, LARGEST_FAULT_SEED)
         super().__init__(build_fleet(self.scenario, record=False).routing(), fault_seed)
         self.bus = _checked(bus)
-        self.folder = folder
+        if not isinstance(folder, (str, os.PathLike)):
+            raise UserError(f"folder: {folder!r} is not allowed; must be a path")
+        self.folder = Path(folder)
         self._processes = None if processes is None else _whole("processes", processes, 1)
         if processes is not None and bus == "local":
             raise UserError("processes: is not allowed on the bus local, where all is one process")
         self._record, self._writes_events = record, events
-        self._patience_s = patience_s
+        self._patience_s = _some_time("patience_s", patience_s, "seconds, math.inf to wait for ever")
         self._made = made
         self._heard: Heard | None = None
         self._until_now: list[Received] = []
@@ -193,9 +195,7 @@ class Fleet(Trouble):
         heard last. The condition is asked after each message from now on, in the order of sending, which is the same
         on both buses.
         """
-        if not isinstance(timeout_s, Real) or not timeout_s > 0:
-            raise UserError(f"timeout_s: {timeout_s!r} is not allowed; must be more than 0 simulated seconds")
-        until_s = self.now_s + timeout_s
+        until_s = self.now_s + _some_time("timeout_s", timeout_s, "simulated seconds")
         flight, holds = self._fly(_Watch(self._new_heard(), self._until_now, condition, until_s), self.bus)
         if not holds:
             when = f"by {until_s:g} s" if flight.digest is None else f"until the mission's end at {flight.end_s:g} s"
@@ -328,6 +328,12 @@ def _whole(name: str, number: int, least: int, most: int | None = None) -> int:
         span = f"of at least {least}" if most is None else f"from {least} to {most}"
         raise UserError(f"{name}: {number!r} is not allowed; must be a whole number {span}")
     return int(number)
+
+
+def _some_time(name: str, time_s: float, unit: str) -> float:
+    if not isinstance(time_s, Real) or not time_s > 0:
+        raise UserError(f"{name}: {time_s!r} is not allowed; must be more than 0 {unit}")
+    return float(time_s)
 
 
 def _checked(bus: Bus) -> Bus:

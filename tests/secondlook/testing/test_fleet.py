@@ -220,14 +220,25 @@ class TestSources:
             ({"fault_seed": "3"}, f"fault_seed: '3' is not allowed; must be a whole number from 0 to {2**63 - 1}"),
             ({"fault_seed": -3}, f"fault_seed: -3 is not allowed; must be a whole number from 0 to {2**63 - 1}"),
             ({"processes": 3}, "processes: is not allowed on the bus local, where all is one process"),
+            ({"folder": 3}, "folder: 3 is not allowed; must be a path"),
+            *(
+                (
+                    {"patience_s": one},
+                    f"patience_s: {one!r} is not allowed; must be more than 0 seconds, math.inf to wait for ever",
+                )
+                for one in ("x", 0, float("nan"))
+            ),
             ({"bus": "zenoh", "processes": 0}, "processes: 0 is not allowed; must be a whole number of at least 1"),
             ({"bus": "zenoh", "processes": "3"}, "processes: '3' is not allowed; must be a whole number of at least 1"),
         ],
     )
     def test_options_that_make_no_sense_are_refused(self, tmp_path: Path, options: Any, sentence: str) -> None:
         with pytest.raises(UserError) as refused:
-            Fleet(BRIEF, folder=tmp_path, **options)
+            Fleet(BRIEF, **{"folder": tmp_path, **options})
         assert str(refused.value) == sentence
+
+    def test_a_folder_may_be_a_text(self, tmp_path: Path) -> None:
+        assert Fleet(BRIEF, folder=str(tmp_path)).folder == tmp_path
 
     def test_a_seed_of_numpys_is_one(self, tmp_path: Path) -> None:
         fleet = Fleet(BRIEF, folder=tmp_path, seed=np.int64(7))  # type: ignore[arg-type]
