@@ -77,9 +77,10 @@ class Dispatch:
         for name, number in through.offers:
             if name in free:
                 right.offered(name, number, departures)
+        waiting = through.waiting & free
         for helper in situation.helpers:
             since_ms, _ = self._waits_ms.pop(helper.vehicle, (now_ms, now_ms))
-            if helper.vehicle in through.waiting & free and helper.free_s <= situation.now_s:
+            if helper.vehicle in waiting and helper.free_s <= situation.now_s:
                 self._waits_ms[helper.vehicle] = since_ms, now_ms
         self._offer(through.offers, situation, now_ms)
         if math.isfinite(through.again_s):

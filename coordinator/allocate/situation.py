@@ -42,8 +42,8 @@ class Helper:
     than over the ground that it sees. Times are seconds since the mission's start. `keep_out`: what it may not enter;
     strips that it cannot fly therefore are among those refused. `heard_s`: when it has said what is known of it, which
     over a slow link may be minutes ago. `waits_s`: how long it must wait before it may set out, by number of the strip
-    to which that is known; from its task's strip if it has one. Where that is for long it is
-    `LONG_WAIT_S`, and the strip among those refused.
+    to which that is known; from its task's strip if it has one. Where that is for long it is `LONG_WAIT_S`, and the
+    strip among those refused.
     """
 
     vehicle: str

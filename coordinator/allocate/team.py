@@ -78,7 +78,9 @@ class Team:
 
     def found(self, time_m2ps: FloatArray) -> Found:
         """The same as it is searched; `time_m2ps`: what a second is worth that each helper keeps."""
-        usual_m2ps, free_s = float(time_m2ps.mean()), np.array([one.free_s for one in self.helpers], dtype=np.float64)
+        usual_m2ps = float(time_m2ps.mean())
+        free_s = np.array([one.free_s for one in self.helpers], dtype=np.float64)
+        from_s = float(free_s.min())
         return Found(
             table=self.table,
             way=self.way,
@@ -94,8 +96,8 @@ class Team:
             rank=self.rank,
             later_m2ps=max(0.0, self.later_m2ps - usual_m2ps),
             later_s=HORIZON_S,
-            from_s=float(free_s.min()),
-            less_ps=LESS_AT_DEADLINE / max(self.deadline_s - float(free_s.min()), 1.0),
+            from_s=from_s,
+            less_ps=LESS_AT_DEADLINE / max(self.deadline_s - from_s, 1.0),
         )
 
     def flown(self, routes: Sequence[Sequence[int]]) -> tuple[float, list[float], dict[int, float]]:

@@ -142,14 +142,15 @@ def test_a_time_is_as_right_as_a_page_says_where_it_was_found_and_less_elsewhere
     missions = by(kept("goal-or-time")["rows"], ("p_detect", "targets.count", UNTIL), "goal.true")
     cleared = "mission.deadline_factor=2", "mission.goal={kind: cleared, clearance: 0.9}"
     found_s = [row["time.mission_s"] for row in kept("goals")["rows"] if case_of(row) == ("two-helpers", cleared)]
-    assert abs(fmean(found_s) - 4915) < 2
+    assert round(fmean(found_s)) == 4914
     found, few, blind = ("-", "-"), ("-", "20"), ("0.5", "-")
     true_with, true_at = (
         {water: fmean(row["goal.true"] for row in missions[*water, until]) for water in (found, few, blind)}
         for until in ("-", "4915")
     )
     assert (true_at[few], true_at[blind]) == (0.85, 0.0)
-    assert true_at[found] >= true_with[found]
+    often = f"is so in {40 * true_at[found]:.0f} of 40 missions, and in {40 * true_with[found]:.0f} with the goal"
+    assert often in words_of("docs/clearance.md")
     assert min(true_with.values()) >= 0.9
     later_s = [fmean(row["time.mission_s"] for row in missions[*water, "-"]) - 4915 for water in (found, few, blind)]
     assert [round(one, -2) for one in later_s] == [0, 900, 3200]
